@@ -1,0 +1,2 @@
+//! The `veduta` command.
+fn main() {}

@@ -1,0 +1,126 @@
+use crate::{Camera, FaceId, Faces, Fragment, Fragments};
+use veduta_geometry::{DVec2, signed_area};
+
+/// Which face is seen where: the result of finding visibility, and the input of all that follows.
+///
+/// `opaque` partitions what is covered of the frame; the rest is background. `veils` are fragments
+/// of faces that are not fully opaque: cut by opaque faces only, they may overlap one another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VisibilityMap {
+    /// The camera it was seen through.
+    pub camera: Camera,
+    /// The seen faces. (Others may be in the table too.)
+    pub faces: Faces,
+    /// Regions in which opaque faces are seen.
+    pub opaque: Fragments,
+    /// Regions in which faces that are not fully opaque are seen.
+    pub veils: Fragments,
+}
+
+/// An invariant of the map that does not hold.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Invariant {
+    /// Fragments name faces of the table.
+    #[error("fragment {fragment} is of face {face:?}, but there are {faces} faces")]
+    UnknownFace {
+        /// Index of the fragment.
+        fragment: usize,
+        /// What it names.
+        face: FaceId,
+        /// Rows of the face table.
+        faces: usize,
+    },
+    /// Fragments are positively wound and convex.
+    #[error("fragment {fragment} of face {face:?} is not a convex polygon wound positively")]
+    NotConvex {
+        /// Index of the fragment.
+        fragment: usize,
+        /// Its face.
+        face: FaceId,
+    },
+    /// Fragments lie in the frame.
+    #[error("fragment {fragment} of face {face:?} has the vertex {vertex}, outside the frame")]
+    OutsideFrame {
+        /// Index of the fragment.
+        fragment: usize,
+        /// Its face.
+        face: FaceId,
+        /// The vertex.
+        vertex: DVec2,
+    },
+    /// Opaque fragments do not overlap, so their areas sum to at most the frame's.
+    #[error("opaque fragments cover {area} of the frame, more than all of it")]
+    Overlap {
+        /// The sum of the areas, where the frame's is 1.
+        area: f64,
+    },
+}
+
+/// How far outside the frame, or on the wrong side of convex, rounding may put a vertex. Larger
+/// would hide real faults; smaller would report the last bits of sound maps.
+const ROUNDING: f64 = 1e-12;
+
+impl VisibilityMap {
+    /// The polygon of a fragment, whole faces included.
+    #[inline]
+    pub fn polygon<'a>(&'a self, fragment: Fragment<'a>) -> &'a [DVec2] {
+        match fragment {
+            Fragment::Whole(face) => self.faces.outline(face),
+            Fragment::Cut { vertices, .. } => vertices,
+        }
+    }
+
+    /// Checks the invariants; the first that fails is returned.
+    ///
+    /// # Errors
+    /// The broken [`Invariant`] and the place where it is broken.
+    pub fn check(&self) -> Result<(), Invariant> {
+        self.check_fragments(&self.veils)?;
+        let area = self.check_fragments(&self.opaque)?;
+        if area > 1.0 + 1e-9 {
+            Err(Invariant::Overlap { area })
+        } else {
+            Ok(())
+        }
+    }
+
+    fn check_fragments(&self, fragments: &Fragments) -> Result<f64, Invariant> {
+        let mut sum = 0.0;
+        for (index, fragment) in fragments.iter().enumerate() {
+            let face = fragment.face();
+            if face.index() >= self.faces.len() {
+                let faces = self.faces.len();
+                return Err(Invariant::UnknownFace {
+                    fragment: index,
+                    face,
+                    faces,
+                });
+            }
+            let polygon = self.polygon(fragment);
+            for &vertex in polygon {
+                let inside = (vertex - 0.5).abs().max_element() <= 0.5 + ROUNDING;
+                if !inside {
+                    return Err(Invariant::OutsideFrame {
+                        fragment: index,
+                        face,
+                        vertex,
+                    });
+                }
+            }
+            let area = signed_area(polygon);
+            let turns_left = (0..polygon.len()).any(|k| {
+                let [p, q, r] = [0, 1, 2].map(|step| polygon[(k + step) % polygon.len()]);
+                veduta_geometry::cross(q - p, r - q) < -ROUNDING
+            });
+            if !(area > 0.0) || turns_left {
+                return Err(Invariant::NotConvex {
+                    fragment: index,
+                    face,
+                });
+            }
+            sum += area;
+        }
+        Ok(sum)
+    }
+}

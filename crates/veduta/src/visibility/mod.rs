@@ -1,0 +1,19 @@
+//! Finding visibility: faces in the image plane -> the regions in which each is seen.
+//!
+//! Several engines do the same step, with the same input and output:
+//!
+//!
+//! All obey one depth order. At a point of the image plane the face with the larger nearness is in
+//! front, as given by the faces' stored planes; of faces that share a plane the smaller id is.
+//! A crossing of two planes is the zero of [`Affine::minus`](veduta_geometry::Affine::minus).
+
+use veduta_map::Fragments;
+
+/// What an engine finds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Where opaque faces are seen; these do not overlap.
+    pub opaque: Fragments,
+    /// Where veils are seen: cut by the opaque faces in front of them, not by one another.
+    pub veils: Fragments,
+}
