@@ -8,6 +8,7 @@
 //! A crossing of two planes is the zero of [`Affine::minus`](veduta_geometry::Affine::minus).
 
 mod project;
+pub mod speculative;
 
 pub use project::project;
 
