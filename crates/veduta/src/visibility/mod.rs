@@ -7,6 +7,10 @@
 //! front, as given by the faces' stored planes; of faces that share a plane the smaller id is.
 //! A crossing of two planes is the zero of [`Affine::minus`](veduta_geometry::Affine::minus).
 
+mod project;
+
+pub use project::project;
+
 use veduta_map::Fragments;
 
 /// What an engine finds.
