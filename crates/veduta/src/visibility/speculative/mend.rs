@@ -12,7 +12,7 @@ pub(super) fn mend(
     context: &Context,
     first_lists: CellLists,
     first_candidates: &[FaceId],
-    thresholds: &mut Vec<f32>,
+    thresholds: &mut [f32],
     verification: Verification,
     seen: &mut Seen,
     report: &mut Report,
@@ -22,7 +22,7 @@ pub(super) fn mend(
     let mut is_candidate = Vec::new();
     let mut failed_before = vec![false; cells];
     loop {
-        let before = thresholds.clone();
+        let before = thresholds.to_vec();
         let guessed = |cell: usize| layers[0].guessed(cell);
         let wrong =
             verification.lower_wrong_thresholds(thresholds, &mut failed_before, 0..cells, guessed);
