@@ -4,10 +4,10 @@
 
 use super::cells::CellLists;
 use super::grid::{Extent, Grid};
-use super::pieces::{Depth, Edge, ON_LINE, Pieces, crossing_tolerance};
+use super::pieces::{Depth, Pieces, crossing_tolerance};
+use super::sides::{Sides, later_sides_separate};
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces, Fragment};
-use wide::f64x4;
 
 /// What all clips share.
 #[derive(Clone, Copy)]
@@ -97,10 +97,9 @@ impl<'a> Clipper<'a> {
                             return true;
                         }
                         compared_with[occluder.index()] = stamp;
-                        let depth = occludee.depth_of(occluder);
-                        if depth != Depth::Behind {
+                        if let Some((depth, sides)) = occludee.occlusion(occluder) {
                             let losses = pieces.losses();
-                            pieces.subtract(occluder, faces.outline(occluder), depth);
+                            pieces.subtract(occluder, faces.outline(occluder), &sides, depth);
                             *tied |= pieces.losses() != losses
                                 && faces.plane(occluder) == faces.plane(face);
                         }
@@ -119,57 +118,43 @@ impl<'a> Clipper<'a> {
 /// A face that may be hidden, made ready to be compared with many others.
 struct Occludee<'a> {
     face: FaceId,
+    faces: &'a Faces,
     outline: &'a [DVec2],
     plane: &'a Affine,
-    faces: &'a Faces,
-    /// The first three sides in lanes (a triangle's all): start, direction, tolerance.
-    start: [f64x4; 2],
-    direction: [f64x4; 2],
-    tolerance: f64x4,
+    sides: Sides,
 }
 
 impl<'a> Occludee<'a> {
     fn new(faces: &'a Faces, face: FaceId) -> Self {
         let outline = faces.outline(face);
-        let (start, direction, tolerance) = sides_in_lanes(outline);
         let plane = faces.face_nearness(face);
-        Self {
-            face,
-            outline,
-            plane,
-            faces,
-            start,
-            direction,
-            tolerance,
-        }
+        Self { face, faces, outline, plane, sides: Sides::group(outline, 0) }
     }
 
-    /// How `occluder` lies to this face; `Behind` also where their projections do not overlap.
+    /// How `occluder` lies to this face, and its sides; `None` where it hides nothing: it is behind,
+    /// or their projections do not overlap.
     #[inline]
-    fn depth_of(&self, occluder: FaceId) -> Depth {
+    fn occlusion(&self, occluder: FaceId) -> Option<(Depth, Sides)> {
         let other = self.faces.outline(occluder);
-        if separated(&self.start, &self.direction, self.tolerance, other) {
-            return Depth::Behind;
+        if self.sides.separate(other) {
+            return None;
         }
         let depth = self.order(occluder, other);
         if depth == Depth::Behind {
-            return depth;
+            return None;
         }
-        let (start, direction, tolerance) = sides_in_lanes(other);
-        let apart = separated(&start, &direction, tolerance, self.outline)
-            || more_sides_separate(self.outline, other)
-            || more_sides_separate(other, self.outline);
-        if apart { Depth::Behind } else { depth }
+        let sides = Sides::group(other, 0);
+        let apart = sides.separate(self.outline)
+            || later_sides_separate(self.outline, other)
+            || later_sides_separate(other, self.outline);
+        (!apart).then_some((depth, sides))
     }
 
     /// Which of the two is in front. Both sides of a pair come to the same answer: a difference of
     /// planes is exactly antisymmetric.
+    #[inline]
     fn order(&self, occluder: FaceId, other: &[DVec2]) -> Depth {
-        let by_key = if occluder < self.face {
-            Depth::InFront
-        } else {
-            Depth::Behind
-        };
+        let by_key = if occluder < self.face { Depth::InFront } else { Depth::Behind };
         if self.faces.plane(self.face) == self.faces.plane(occluder) {
             return by_key;
         }
@@ -191,56 +176,4 @@ impl<'a> Occludee<'a> {
         }
         Depth::Crossing(difference)
     }
-}
-
-/// Starts, directions and tolerances of an outline's first three sides.
-#[inline(always)]
-fn sides_in_lanes(outline: &[DVec2]) -> ([f64x4; 2], [f64x4; 2], f64x4) {
-    let fourth = if outline.len() == 3 {
-        outline[0]
-    } else {
-        outline[3]
-    };
-    let [p, q, r] = [outline[0], outline[1], outline[2]];
-    // The last lane repeats the first side.
-    let x = f64x4::from([p.x, q.x, r.x, p.x]);
-    let y = f64x4::from([p.y, q.y, r.y, p.y]);
-    let dx = f64x4::from([q.x, r.x, fourth.x, q.x]) - x;
-    let dy = f64x4::from([q.y, r.y, fourth.y, q.y]) - y;
-    (
-        [x, y],
-        [dx, dy],
-        (dx.abs() + dy.abs()) * f64x4::splat(ON_LINE),
-    )
-}
-
-/// Whether all points lie outside or on one of the lines.
-#[inline(always)]
-fn separated(
-    start: &[f64x4; 2],
-    direction: &[f64x4; 2],
-    tolerance: f64x4,
-    points: &[DVec2],
-) -> bool {
-    let beyond = |point: DVec2| {
-        direction[0] * (f64x4::splat(point.y) - start[1])
-            - direction[1] * (f64x4::splat(point.x) - start[0])
-    };
-    let mut farthest = beyond(points[0]);
-    for &point in &points[1..] {
-        farthest = farthest.fast_max(beyond(point));
-    }
-    farthest.simd_le(tolerance).any()
-}
-
-/// Whether a side of `outline` after its third separates it from `points`.
-fn more_sides_separate(outline: &[DVec2], points: &[DVec2]) -> bool {
-    (3..outline.len()).any(|index| {
-        let end = outline[if index + 1 == outline.len() {
-            0
-        } else {
-            index + 1
-        }];
-        Edge::new(outline[index], end).separates(points.iter().copied())
-    })
 }

@@ -22,6 +22,7 @@ mod grid;
 mod guess;
 mod mend;
 mod pieces;
+mod sides;
 mod verify;
 
 use super::Seen;

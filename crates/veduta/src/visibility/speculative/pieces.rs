@@ -3,16 +3,11 @@
 //! Pieces live in one arena that is emptied for the next face. A piece that an occluder does not
 //! touch stays where it is; of one that it cuts, the parts are appended.
 
+use super::sides::{LANES, Sides};
 use std::ops::Range;
 use veduta_geometry::{Affine, DVec2, cross};
 use veduta_map::{FaceId, Side};
-
-/// Distance, in frame heights or widths, within which a point counts as lying on a line.
-///
-/// Points constructed on a line miss it by a few units of 2^-53. Without this band every such miss
-/// would cut off a sliver; the area it can misplace is its width times a line's length in a pixel,
-/// 2e-12 pixels at 2000 pixels across.
-pub(super) const ON_LINE: f64 = 1e-15;
+use wide::f64x4;
 
 /// Area, as a share of the frame, below which a piece is dropped: 2e-12 pixels at 1920 x 1080.
 const NEGLIGIBLE_AREA: f64 = 1e-18;
@@ -24,38 +19,19 @@ pub(super) struct Corner {
     pub side: Side,
 }
 
-/// The line through a side of an occluder, its inside on the positive side.
+/// A corner of the piece that is being cut, with its distances from the cutting lines.
 #[derive(Clone, Copy)]
-pub(super) struct Edge {
-    start: DVec2,
-    direction: DVec2,
-    /// [`ON_LINE`] in units of [`Edge::beyond`].
-    tolerance: f64,
+struct Measured {
+    corner: Corner,
+    distance: [f64; LANES],
 }
 
-impl Edge {
-    #[inline(always)]
-    pub fn new(start: DVec2, end: DVec2) -> Self {
-        let direction = end - start;
-        let tolerance = ON_LINE * (direction.x.abs() + direction.y.abs());
-        Self {
-            start,
-            direction,
-            tolerance,
-        }
-    }
-
-    /// Positive inside; exactly zero at the edge's start.
-    #[inline(always)]
-    fn beyond(&self, point: DVec2) -> f64 {
-        cross(self.direction, point - self.start)
-    }
-
-    /// Whether all of `points` lie outside or on the line.
-    #[inline(always)]
-    pub fn separates(&self, mut points: impl Iterator<Item = DVec2>) -> bool {
-        points.all(|point| self.beyond(point) <= self.tolerance)
-    }
+/// A convex piece: corners in the arena, and the box around them.
+#[derive(Clone, Debug)]
+struct Piece {
+    corners: Range<u32>,
+    min: DVec2,
+    max: DVec2,
 }
 
 /// How an occluder lies to the face it may hide.
@@ -78,36 +54,33 @@ pub(super) fn crossing_tolerance(difference: &Affine) -> f64 {
 /// Pieces of one face.
 #[derive(Default)]
 pub(super) struct Pieces {
-    corners: Vec<Corner>,
-    pieces: Vec<Range<u32>>,
-    next: Vec<Range<u32>>,
-    outside: Vec<Range<u32>>,
-    distances: Vec<f64>,
-    edges: Vec<Edge>,
+    arena: Vec<Corner>,
+    pieces: Vec<Piece>,
+    next: Vec<Piece>,
+    /// The overlap of a piece with the occluder, and what is left of it after one more cut.
+    overlap: [Vec<Measured>; 2],
     touched: bool,
     crossed: bool,
-    /// How often a part was taken away.
     losses: usize,
 }
 
 impl Pieces {
     /// Starts anew with the whole outline of `face`.
     pub fn start(&mut self, face: FaceId, outline: &[DVec2]) {
-        self.corners.clear();
-        self.corners
-            .extend(outline.iter().enumerate().map(|(index, &point)| Corner {
-                point,
-                side: Side::of_outline(face, index),
-            }));
-        self.pieces.clear();
-        self.pieces.push(0..outline.len() as u32);
+        self.clear();
         self.touched = false;
-        self.crossed = false;
+        self.arena.extend(
+            outline
+                .iter()
+                .enumerate()
+                .map(|(index, &point)| Corner { point, side: Side::of_outline(face, index) }),
+        );
+        self.pieces.extend(Piece::from(&self.arena, 0));
     }
 
     /// Starts anew with nothing, for [`Pieces::add`].
     pub fn clear(&mut self) {
-        self.corners.clear();
+        self.arena.clear();
         self.pieces.clear();
         self.touched = true;
         self.crossed = false;
@@ -115,14 +88,10 @@ impl Pieces {
 
     /// Adds a piece found before.
     pub fn add(&mut self, points: &[DVec2], sides: &[Side]) {
-        let start = self.corners.len() as u32;
-        self.corners.extend(
-            points
-                .iter()
-                .zip(sides)
-                .map(|(&point, &side)| Corner { point, side }),
-        );
-        self.pieces.push(start..self.corners.len() as u32);
+        let start = self.arena.len();
+        let corners = points.iter().zip(sides).map(|(&point, &side)| Corner { point, side });
+        self.arena.extend(corners);
+        self.pieces.extend(Piece::from(&self.arena, start));
     }
 
     /// Whether nothing is left.
@@ -147,197 +116,228 @@ impl Pieces {
 
     /// The pieces.
     pub fn iter(&self) -> impl Iterator<Item = &[Corner]> {
-        self.pieces
-            .iter()
-            .map(|piece| corners(&self.corners, piece))
+        self.pieces.iter().map(|piece| piece.corners(&self.arena))
     }
 
-    /// Takes away the part that `occluder` hides.
-    pub fn subtract(&mut self, occluder: FaceId, outline: &[DVec2], depth: Depth) {
+    /// Takes away the part that `occluder` hides. `sides` are those of its outline (the first four
+    /// of them).
+    pub fn subtract(&mut self, occluder: FaceId, outline: &[DVec2], sides: &Sides, depth: Depth) {
         debug_assert!(depth != Depth::Behind);
-        self.edges.clear();
-        for (index, &start) in outline.iter().enumerate() {
-            let end = outline[if index + 1 == outline.len() {
-                0
-            } else {
-                index + 1
-            }];
-            self.edges.push(Edge::new(start, end));
+        let (mut min, mut max) = (outline[0], outline[0]);
+        for &point in &outline[1..] {
+            min = min.min(point);
+            max = max.max(point);
         }
         let mut pieces = std::mem::take(&mut self.pieces);
         self.next.clear();
         for piece in pieces.drain(..) {
-            self.subtract_from_piece(piece, occluder, outline, depth);
+            let apart = piece.min.x >= max.x
+                || piece.min.y >= max.y
+                || piece.max.x <= min.x
+                || piece.max.y <= min.y;
+            if apart || !self.cut_away(&piece, occluder, outline, sides, depth) {
+                self.next.push(piece);
+            }
         }
         self.pieces = std::mem::replace(&mut self.next, pieces);
     }
 
-    fn subtract_from_piece(
+    /// Replaces `piece` by what the occluder leaves of it; false, and nothing is done, if that is
+    /// all of it.
+    fn cut_away(
         &mut self,
-        piece: Range<u32>,
+        piece: &Piece,
         occluder: FaceId,
         outline: &[DVec2],
+        sides: &Sides,
         depth: Depth,
-    ) {
-        if self.is_apart(&piece, outline) {
-            self.next.push(piece);
-            return;
-        }
+    ) -> bool {
+        let corners = piece.corners(&self.arena);
+        let arena = self.arena.len();
+        let kept = self.next.len();
+        let [overlap, after] = &mut self.overlap;
+        overlap.clear();
+        overlap.extend(
+            corners.iter().map(|&corner| Measured { corner, distance: [0.0; LANES] }),
+        );
+
         // Cut along one side of the occluder after the other: what lies outside is kept, what is
         // inside of all of them is the overlap.
-        let arena = self.corners.len();
-        self.outside.clear();
-        let mut overlap = piece.clone();
-        for index in 0..self.edges.len() {
-            let edge = self.edges[index];
-            self.distances.clear();
-            self.distances.extend(
-                corners(&self.corners, &overlap)
-                    .iter()
-                    .map(|corner| edge.beyond(corner.point)),
-            );
-            let side = Side::of_outline(occluder, index);
-            let (inside, outside) = self.split(overlap, edge.tolerance, side);
-            let Some(inside) = inside else {
-                self.corners.truncate(arena);
-                self.next.push(piece);
-                return;
-            };
-            self.outside.extend(outside);
-            overlap = inside;
+        for first in (0..outline.len()).step_by(LANES) {
+            let group = if first == 0 { *sides } else { Sides::group(outline, first) };
+            let cutting = measure(overlap, &group);
+            if cutting == Cutting::Separated
+                || first == 0 && separated_by_sides(overlap, outline)
+            {
+                self.undo(arena, kept);
+                return false;
+            }
+            let Cutting::Lanes(lanes) = cutting else { continue };
+            let tolerance = group.tolerance.to_array();
+            for lane in (0..group.count).filter(|lane| lanes >> lane & 1 == 1) {
+                let side = Side::of_outline(occluder, first + lane);
+                let outside = self.arena.len();
+                split(overlap, after, &mut self.arena, lane, tolerance[lane], side);
+                std::mem::swap(overlap, after);
+                self.next.extend(Piece::from(&self.arena, outside));
+                if overlap.len() < 3 {
+                    self.undo(arena, kept);
+                    return false;
+                }
+            }
         }
-        let mut in_front = None;
+
         if let Depth::Crossing(difference) = depth {
-            self.distances.clear();
-            self.distances.extend(
-                corners(&self.corners, &overlap)
-                    .iter()
-                    .map(|corner| -difference.at(corner.point)),
-            );
             let tolerance = crossing_tolerance(&difference);
-            let (before, behind) = self.split(overlap, tolerance, Side::crossing(occluder));
-            let Some(behind) = behind else {
-                self.corners.truncate(arena);
-                self.next.push(piece);
-                return;
-            };
-            self.crossed |= before.is_some();
-            in_front = before;
-            overlap = behind;
+            for measured in overlap.iter_mut() {
+                measured.distance[0] = difference.at(measured.corner.point);
+            }
+            if !overlap.iter().any(|measured| measured.distance[0] > tolerance) {
+                self.undo(arena, kept);
+                return false;
+            }
+            if overlap.iter().any(|measured| measured.distance[0] < -tolerance) {
+                let before = self.arena.len();
+                split(overlap, after, &mut self.arena, 0, tolerance, Side::crossing(occluder));
+                std::mem::swap(overlap, after);
+                self.next.extend(Piece::from(&self.arena, before));
+                self.crossed = true;
+            }
         }
-        if twice_area(corners(&self.corners, &overlap)) <= 2.0 * NEGLIGIBLE_AREA {
-            self.corners.truncate(arena);
-            self.next.push(piece);
-            return;
+        if overlap.len() < 3 || twice_area(overlap.iter().map(|m| m.corner.point)) <= 2.0 * NEGLIGIBLE_AREA
+        {
+            self.undo(arena, kept);
+            return false;
         }
         self.touched = true;
         self.losses += 1;
-        for part in self.outside.drain(..).chain(in_front) {
-            if twice_area(corners(&self.corners, &part)) > 2.0 * NEGLIGIBLE_AREA {
-                self.next.push(part);
-            }
-        }
+        true
     }
 
-    /// Whether a side of the piece or of the occluder has the other on its outside.
-    fn is_apart(&self, piece: &Range<u32>, outline: &[DVec2]) -> bool {
-        let piece = corners(&self.corners, piece);
-        self.edges
-            .iter()
-            .any(|edge| edge.separates(piece.iter().map(|corner| corner.point)))
-            || (0..piece.len()).any(|index| {
-                let end = piece[if index + 1 == piece.len() {
-                    0
-                } else {
-                    index + 1
-                }]
-                .point;
-                Edge::new(piece[index].point, end).separates(outline.iter().copied())
-            })
+    fn undo(&mut self, arena: usize, kept: usize) {
+        self.arena.truncate(arena);
+        self.next.truncate(kept);
     }
+}
 
-    /// Splits a piece along a line, given its corners' signed distances in `self.distances`, and
-    /// returns what lies on the positive and on the negative side. `side` names the line.
-    ///
-    /// A piece all on one side (or on the line) is returned as it is, without a copy.
-    fn split(
-        &mut self,
-        piece: Range<u32>,
-        tolerance: f64,
-        side: Side,
-    ) -> (Option<Range<u32>>, Option<Range<u32>>) {
-        let positive = self.distances.iter().any(|&distance| distance > tolerance);
-        let negative = self.distances.iter().any(|&distance| distance < -tolerance);
-        if !negative {
-            return if positive {
-                (Some(piece), None)
-            } else {
-                (None, Some(piece))
-            };
-        }
-        if !positive {
-            return (None, Some(piece));
-        }
-        let inside = self.cut(&piece, tolerance, side, 1.0);
-        let outside = self.cut(&piece, tolerance, side, -1.0);
-        (inside, outside)
-    }
-
-    /// The part of a piece where `sign * distance` is not negative, as a new piece.
-    fn cut(
-        &mut self,
-        piece: &Range<u32>,
-        tolerance: f64,
-        side: Side,
-        sign: f64,
-    ) -> Option<Range<u32>> {
-        let first = self.corners.len() as u32;
-        let count = piece.len();
-        let start = piece.start as usize;
-        for index in 0..count {
-            let after = if index + 1 == count { 0 } else { index + 1 };
-            let here = self.corners[start + index];
-            let there = self.corners[start + after];
-            let (d_here, d_there) = (sign * self.distances[index], sign * self.distances[after]);
-            if d_here >= -tolerance {
-                // On the line with the next vertex beyond it: the side from here is the cut.
-                let leaves = d_here <= tolerance && d_there < -tolerance;
-                let side = if leaves { side } else { here.side };
-                self.corners.push(Corner {
-                    point: here.point,
-                    side,
-                });
-            }
-            let enters = d_here < -tolerance && d_there > tolerance;
-            let leaves = d_here > tolerance && d_there < -tolerance;
-            if enters || leaves {
-                let point = here.point + (there.point - here.point) * (d_here / (d_here - d_there));
-                self.corners.push(Corner {
-                    point,
-                    side: if leaves { side } else { here.side },
-                });
-            }
-        }
-        let end = self.corners.len() as u32;
-        if end - first < 3 {
-            self.corners.truncate(first as usize);
+impl Piece {
+    /// The piece with the corners from `start` on, unless its area is negligible.
+    fn from(arena: &[Corner], start: usize) -> Option<Self> {
+        let corners = &arena[start..];
+        if corners.len() < 3
+            || twice_area(corners.iter().map(|corner| corner.point)) <= 2.0 * NEGLIGIBLE_AREA
+        {
             return None;
         }
-        Some(first..end)
+        let (mut min, mut max) = (corners[0].point, corners[0].point);
+        for corner in &corners[1..] {
+            min = min.min(corner.point);
+            max = max.max(corner.point);
+        }
+        Some(Self { corners: start as u32..arena.len() as u32, min, max })
+    }
+
+    #[inline(always)]
+    fn corners<'a>(&self, arena: &'a [Corner]) -> &'a [Corner] {
+        &arena[self.corners.start as usize..self.corners.end as usize]
     }
 }
 
-#[inline(always)]
-fn corners<'a>(arena: &'a [Corner], piece: &Range<u32>) -> &'a [Corner] {
-    &arena[piece.start as usize..piece.end as usize]
+/// What the sides of an occluder do to a piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cutting {
+    /// One of them has all of the piece on its outside.
+    Separated,
+    /// These cut it; it is inside of the others.
+    Lanes(u32),
 }
 
-/// Twice the area of a piece, relative to its first corner.
+/// Measures the corners' distances from the sides.
 #[inline]
-pub(super) fn twice_area(piece: &[Corner]) -> f64 {
-    let first = piece[0].point;
-    piece[1..]
-        .windows(2)
-        .map(|edge| cross(edge[0].point - first, edge[1].point - first))
+fn measure(piece: &mut [Measured], sides: &Sides) -> Cutting {
+    let mut nearest = f64x4::splat(f64::INFINITY);
+    let mut farthest = f64x4::splat(f64::NEG_INFINITY);
+    for measured in piece {
+        let distance = sides.inside(measured.corner.point);
+        nearest = nearest.fast_min(distance);
+        farthest = farthest.fast_max(distance);
+        measured.distance = distance.to_array();
+    }
+    if farthest.simd_le(sides.tolerance).any() {
+        return Cutting::Separated;
+    }
+    Cutting::Lanes(nearest.simd_lt(-sides.tolerance).to_bitmask())
+}
+
+/// Whether a side of the piece has all of `outline` on its outside.
+#[inline]
+fn separated_by_sides(piece: &[Measured], outline: &[DVec2]) -> bool {
+    let mut start = piece[piece.len() - 1].corner.point;
+    piece.iter().any(|measured| {
+        let end = measured.corner.point;
+        let direction = end - start;
+        let tolerance = super::sides::ON_LINE * (direction.x.abs() + direction.y.abs());
+        let origin = std::mem::replace(&mut start, end);
+        outline.iter().all(|&point| cross(direction, point - origin) <= tolerance)
+    })
+}
+
+/// Splits a piece along the line of `lane`: what is inside of it becomes `inside`, what is outside
+/// is appended to the arena. `side` names the line.
+#[inline]
+fn split(
+    piece: &[Measured],
+    inside: &mut Vec<Measured>,
+    outside: &mut Vec<Corner>,
+    lane: usize,
+    tolerance: f64,
+    side: Side,
+) {
+    inside.clear();
+    let mut here = &piece[piece.len() - 1];
+    for there in piece {
+        let (d_here, d_there) = (here.distance[lane], there.distance[lane]);
+        // A corner on the line belongs to both parts. The side from it is the cut in the part that
+        // the next corner has left.
+        if d_here >= -tolerance {
+            let leaves = d_here <= tolerance && d_there < -tolerance;
+            let along = if leaves { side } else { here.corner.side };
+            inside.push(Measured { corner: Corner { side: along, ..here.corner }, ..*here });
+        }
+        if d_here <= tolerance {
+            let leaves = d_here >= -tolerance && d_there > tolerance;
+            let along = if leaves { side } else { here.corner.side };
+            outside.push(Corner { side: along, ..here.corner });
+        }
+        let leaves = d_here > tolerance && d_there < -tolerance;
+        let enters = d_here < -tolerance && d_there > tolerance;
+        if leaves || enters {
+            let share = d_here / (d_here - d_there);
+            let point = here.corner.point + (there.corner.point - here.corner.point) * share;
+            let mut distance = std::array::from_fn(|other| {
+                here.distance[other] + (there.distance[other] - here.distance[other]) * share
+            });
+            distance[lane] = 0.0;
+            let (within, without) =
+                if leaves { (side, here.corner.side) } else { (here.corner.side, side) };
+            inside.push(Measured { corner: Corner { point, side: within }, distance });
+            outside.push(Corner { point, side: without });
+        }
+        here = there;
+    }
+}
+
+/// Twice the area of a polygon, relative to its first corner.
+#[inline]
+fn twice_area(mut points: impl Iterator<Item = DVec2>) -> f64 {
+    let (Some(first), Some(second)) = (points.next(), points.next()) else {
+        return 0.0;
+    };
+    let mut previous = second - first;
+    points
+        .map(|point| {
+            let next = point - first;
+            cross(std::mem::replace(&mut previous, next), next)
+        })
         .sum()
 }
