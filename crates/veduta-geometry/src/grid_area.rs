@@ -252,7 +252,7 @@ fn walk<A: Measure>(
     };
     let start = extent.min.y.max(f64::from(rows.start));
     let end = extent.max.y.min(f64::from(rows.end));
-    if !(start < end) {
+    if start >= end {
         return;
     }
 
@@ -635,7 +635,9 @@ mod tests {
             } else {
                 3 + (self.unit() * 5.0) as usize
             };
-            let mut angles: Vec<f64> = (0..corners).map(|_| self.unit() * 6.283).collect();
+            let mut angles: Vec<f64> = (0..corners)
+                .map(|_| self.unit() * std::f64::consts::TAU)
+                .collect();
             angles.sort_by(f64::total_cmp);
             let mut polygon: Vec<DVec2> = angles
                 .iter()
