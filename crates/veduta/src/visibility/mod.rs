@@ -9,6 +9,7 @@
 
 pub mod multiscan;
 mod project;
+pub mod speculative;
 
 pub use project::project;
 
