@@ -7,6 +7,7 @@
 //! front, as given by the faces' stored planes; of faces that share a plane the smaller id is.
 //! A crossing of two planes is the zero of [`Affine::minus`](veduta_geometry::Affine::minus).
 
+pub mod multiscan;
 mod project;
 pub mod speculative;
 
