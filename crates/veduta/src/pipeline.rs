@@ -5,9 +5,10 @@ use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid};
 use crate::scene::{AlphaMode, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces};
+use crate::visibility::{self, Seen, speculative};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use veduta_map::{MaterialId, VisibilityMap};
+use veduta_map::{Camera, MaterialId, VisibilityMap};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +53,32 @@ pub enum Shortcoming {
     DrawnOpaque(MaterialId),
     /// This many fragments of faces that are not fully opaque were left out.
     VeilsLeftOut(usize),
+}
+
+/// Finds what `camera` sees of `scene`.
+///
+/// The map has no resolution: pictures of any size are made of it.
+pub fn find_visibility(scene: &Scene, camera: &Camera) -> VisibilityMap {
+    let faces = visibility::project(scene, camera);
+    let settings = speculative::Settings {
+        aspect: camera.aspect(),
+        ..Default::default()
+    };
+    let Seen { opaque, veils } = speculative::find(&faces, &settings);
+    VisibilityMap {
+        camera: *camera,
+        faces,
+        opaque,
+        veils,
+    }
+}
+
+/// Makes the picture that `camera` takes of `scene`.
+///
+/// # Panics
+/// If the size is 0, or the picture is too large for the machine's memory.
+pub fn render(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Picture {
+    render_map(scene, &find_visibility(scene, camera), settings)
 }
 
 /// Makes the picture of a map of `scene`, which must be the scene that the map was made of.
@@ -132,7 +159,7 @@ mod tests {
     use super::*;
     use crate::scene::{Image, ImageId, Material, Mesh, MeshId, Object, TextureRef};
     use veduta_geometry::{DMat4, DVec2, DVec3, Vec2, Vec3};
-    use veduta_map::{Affine, Camera, Faces, Fragments, ObjectId, Projection};
+    use veduta_map::{Affine, Faces, Fragments, ObjectId, Projection};
 
     /// A scene of one mesh with one material.
     fn scene_of(mesh: Mesh, material: Material) -> Scene {
