@@ -304,7 +304,7 @@ mod tests {
             perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.5),
             parallel(DVec3::new(1.0, -4.0, 1.5), 2.5, 1.5),
         ] {
-            let (width, height) = (96_usize, 64_usize);
+            let (width, height) = (144_usize, 96_usize);
             let map = map_of(&scene, camera);
             let picture = render_map(&scene, &map, &unlit(width as u32, height as u32));
 
@@ -349,11 +349,10 @@ mod tests {
                 squares += (f64::from(found[0]) - expected[0]).powi(2);
                 edges += usize::from(expected[0] > 0.0 && expected[0] < expected[1]);
             }
-            // A trilinear look-up blurs an edge over two pixels or so, which a box filter does not.
-            // Interpolating without regard to perspective gives 0.4.
+            // A trilinear look-up blurs an edge a little more than the box filter does: 0.0145 here.
             let rms = (squares / supersampled.len() as f64).sqrt();
             assert!(
-                edges > 500 && rms < 0.1,
+                edges > 1000 && rms < 0.02,
                 "off by {rms} with {edges} pixels on edges"
             );
 
@@ -368,7 +367,7 @@ mod tests {
                     assert!((found - here[0]).abs() < 0.02, "{found} at {column}, {row}");
                 }
             }
-            assert!(plain > 200, "{plain} pixels are away from edges");
+            assert!(plain > 800, "{plain} pixels are away from edges");
         }
     }
 
