@@ -2,10 +2,13 @@
 //!
 //! Several engines do the same step, with the same input and output:
 //!
+//! - [`cross_scanline`]: an exact sweep through strips of the frame, without any guess.
 //!
 //! All obey one depth order. At a point of the image plane the face with the larger nearness is in
 //! front, as given by the faces' stored planes; of faces that share a plane the smaller id is.
 //! A crossing of two planes is the zero of [`Affine::minus`](veduta_geometry::Affine::minus).
+
+pub mod cross_scanline;
 
 use veduta_map::Fragments;
 
