@@ -12,14 +12,15 @@ use support::samples;
 use support::scenes::{LARGE, Scene};
 use veduta::geometry::{DVec2, DVec3};
 use veduta::map::{Camera, Faces, Fragment, Projection, Side, VisibilityMap};
+use veduta::visibility::speculative::{self, Report};
 use veduta::visibility::{Seen, cross_scanline};
 
 /// A way to find visibility, and its name.
-type Engine = (&'static str, fn(&Scene) -> Seen);
+type Engine = (&'static str, fn(&Scene) -> (Seen, Report));
 
 /// The engines under test. They are compared with the first one, which cuts the frame into a strip
 /// for each row of pixels, like the paper.
-const ENGINES: [Engine; 3] = [
+const ENGINES: [Engine; 6] = [
     ("sweep, a strip for each row", |scene| {
         sweep(&scene.faces, scene.height)
     }),
@@ -29,15 +30,31 @@ const ENGINES: [Engine; 3] = [
     ("sweep, strips out of step with the rows", |scene| {
         sweep(&scene.faces, 7)
     }),
+    ("clip without a guess", |scene| clip(scene, false, None)),
+    ("speculative", |scene| clip(scene, true, None)),
+    ("speculative, coarse cells", |scene| {
+        clip(scene, true, Some(60))
+    }),
 ];
 
-fn sweep(faces: &Faces, strips: u32) -> Seen {
-    cross_scanline::find(
+fn clip(scene: &Scene, guess: bool, cells: Option<u32>) -> (Seen, Report) {
+    let aspect = f64::from(scene.width) / f64::from(scene.height);
+    let settings = speculative::Settings {
+        guess,
+        aspect,
+        cells,
+    };
+    speculative::find_and_report(&scene.faces, &settings)
+}
+
+fn sweep(faces: &Faces, strips: u32) -> (Seen, Report) {
+    let seen = cross_scanline::find(
         faces,
         &cross_scanline::Settings {
             strips: strips.max(1),
         },
-    )
+    );
+    (seen, Report::default())
 }
 
 /// Law 1: coverage per face and pixel, in square pixels.
@@ -50,19 +67,24 @@ const SCENES: u64 = if cfg!(debug_assertions) { 300 } else { 10_000 };
 fn seeds(count: u64) -> Vec<u64> {
     match std::env::var("VEDUTA_SEED") {
         Ok(seed) => vec![seed.parse().expect("VEDUTA_SEED is a number")],
-        Err(_) => (0..count).collect(),
+        Err(_) => {
+            let few = std::env::var("VEDUTA_SCENES").ok();
+            (0..few.map_or(count, |few| few.parse().expect("VEDUTA_SCENES is a number"))).collect()
+        }
     }
 }
 
 #[test]
 fn all_engines_see_the_same_areas() {
-    let [large, piercing, ties, veils] = [0; 4].map(AtomicUsize::new);
+    let [large, piercing, ties, veils, mended] = [0; 5].map(AtomicUsize::new);
     let seeds = seeds(SCENES);
     let failures: Vec<String> = seeds
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::random(seed);
-            let results = ENGINES.map(|(name, find)| (name, find(&scene)));
+            let reports = ENGINES.map(|(name, find)| (name, find(&scene)));
+            let is_mended = reports.iter().any(|(_, (_, report))| report.rounds > 0);
+            let results = reports.map(|(name, (seen, _))| (name, seen));
             let count = |counter: &AtomicUsize, does: bool| {
                 counter.fetch_add(usize::from(does), Ordering::Relaxed);
             };
@@ -70,20 +92,22 @@ fn all_engines_see_the_same_areas() {
             count(&piercing, has_piercing(&results[0].1));
             count(&ties, has_ties(&scene.faces, &results[0].1));
             count(&veils, !results[0].1.veils.is_empty());
+            count(&mended, is_mended);
             same_areas(&scene, &results)
                 .err()
                 .map(|error| format!("{scene}: {error}"))
         })
         .collect();
-    let counts = [large, piercing, ties, veils].map(AtomicUsize::into_inner);
+    let counts = [large, piercing, ties, veils, mended].map(AtomicUsize::into_inner);
     println!(
         "{} scenes: {} of more than {LARGE} faces, {} with faces that pierce each other, {} with \
-         ties of coplanar faces, {} with veils",
+         ties of coplanar faces, {} with veils, {} in which a wrong guess was mended",
         seeds.len(),
         counts[0],
         counts[1],
         counts[2],
-        counts[3]
+        counts[3],
+        counts[4]
     );
     report(&failures);
     if seeds.len() > 1 {
@@ -193,7 +217,7 @@ fn areas_are_those_that_samples_find() {
             (scene.width, scene.height) = (8, 6);
             let shares = samples::sample(&scene.faces, scene.width, scene.height, seed);
             ENGINES.iter().find_map(|(name, find)| {
-                let seen = find(&scene);
+                let (seen, _) = find(&scene);
                 let fragments = [(&seen.opaque, &shares.opaque), (&seen.veils, &shares.veils)];
                 fragments.into_iter().find_map(|(fragments, shares)| {
                     let coverage =
@@ -240,7 +264,7 @@ fn sides_lie_on_the_lines_they_name() {
         .filter_map(|&seed| {
             let scene = Scene::small(seed);
             ENGINES.iter().find_map(|(name, find)| {
-                let seen = find(&scene);
+                let (seen, _) = find(&scene);
                 sides(&seen).find_map(|(fragment, ends, side)| {
                     let off = ends
                         .map(|end| distance_from_line(&scene.faces, &fragment, side, end))
@@ -293,7 +317,7 @@ fn both_sides_of_a_scanline_show_the_same_face() {
                 return None;
             }
             ENGINES.iter().find_map(|(name, find)| {
-                let seen = find(&scene);
+                let (seen, _) = find(&scene);
                 sides(&seen).find_map(|(fragment, [from, to], side)| {
                     let is_long = from.distance(to) > 100.0 * NEXT;
                     if side.kind != Side::SCAN || !is_long {
@@ -325,8 +349,8 @@ fn the_number_of_threads_makes_no_difference() {
     for seed in seeds(SCENES / 100) {
         let scene = Scene::random(seed);
         for (name, find) in ENGINES {
-            let alone = one.install(|| find(&scene));
-            let together = three.install(|| find(&scene));
+            let (alone, _) = one.install(|| find(&scene));
+            let (together, _) = three.install(|| find(&scene));
             assert!(alone == together, "{scene}: {name} depends on threads");
         }
     }
