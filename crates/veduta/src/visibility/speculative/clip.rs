@@ -128,7 +128,13 @@ impl<'a> Occludee<'a> {
     fn new(faces: &'a Faces, face: FaceId) -> Self {
         let outline = faces.outline(face);
         let plane = faces.face_nearness(face);
-        Self { face, faces, outline, plane, sides: Sides::group(outline, 0) }
+        Self {
+            face,
+            faces,
+            outline,
+            plane,
+            sides: Sides::group(outline, 0),
+        }
     }
 
     /// How `occluder` lies to this face, and its sides; `None` where it hides nothing: it is behind,
@@ -154,7 +160,11 @@ impl<'a> Occludee<'a> {
     /// planes is exactly antisymmetric.
     #[inline]
     fn order(&self, occluder: FaceId, other: &[DVec2]) -> Depth {
-        let by_key = if occluder < self.face { Depth::InFront } else { Depth::Behind };
+        let by_key = if occluder < self.face {
+            Depth::InFront
+        } else {
+            Depth::Behind
+        };
         if self.faces.plane(self.face) == self.faces.plane(occluder) {
             return by_key;
         }

@@ -69,12 +69,11 @@ impl Pieces {
     pub fn start(&mut self, face: FaceId, outline: &[DVec2]) {
         self.clear();
         self.touched = false;
-        self.arena.extend(
-            outline
-                .iter()
-                .enumerate()
-                .map(|(index, &point)| Corner { point, side: Side::of_outline(face, index) }),
-        );
+        self.arena
+            .extend(outline.iter().enumerate().map(|(index, &point)| Corner {
+                point,
+                side: Side::of_outline(face, index),
+            }));
         self.pieces.extend(Piece::from(&self.arena, 0));
     }
 
@@ -89,7 +88,10 @@ impl Pieces {
     /// Adds a piece found before.
     pub fn add(&mut self, points: &[DVec2], sides: &[Side]) {
         let start = self.arena.len();
-        let corners = points.iter().zip(sides).map(|(&point, &side)| Corner { point, side });
+        let corners = points
+            .iter()
+            .zip(sides)
+            .map(|(&point, &side)| Corner { point, side });
         self.arena.extend(corners);
         self.pieces.extend(Piece::from(&self.arena, start));
     }
@@ -157,22 +159,27 @@ impl Pieces {
         let kept = self.next.len();
         let [overlap, after] = &mut self.overlap;
         overlap.clear();
-        overlap.extend(
-            corners.iter().map(|&corner| Measured { corner, distance: [0.0; LANES] }),
-        );
+        overlap.extend(corners.iter().map(|&corner| Measured {
+            corner,
+            distance: [0.0; LANES],
+        }));
 
         // Cut along one side of the occluder after the other: what lies outside is kept, what is
         // inside of all of them is the overlap.
         for first in (0..outline.len()).step_by(LANES) {
-            let group = if first == 0 { *sides } else { Sides::group(outline, first) };
+            let group = if first == 0 {
+                *sides
+            } else {
+                Sides::group(outline, first)
+            };
             let cutting = measure(overlap, &group);
-            if cutting == Cutting::Separated
-                || first == 0 && separated_by_sides(overlap, outline)
-            {
+            if cutting == Cutting::Separated || first == 0 && separated_by_sides(overlap, outline) {
                 self.undo(arena, kept);
                 return false;
             }
-            let Cutting::Lanes(lanes) = cutting else { continue };
+            let Cutting::Lanes(lanes) = cutting else {
+                continue;
+            };
             let tolerance = group.tolerance.to_array();
             for lane in (0..group.count).filter(|lane| lanes >> lane & 1 == 1) {
                 let side = Side::of_outline(occluder, first + lane);
@@ -192,19 +199,33 @@ impl Pieces {
             for measured in overlap.iter_mut() {
                 measured.distance[0] = difference.at(measured.corner.point);
             }
-            if !overlap.iter().any(|measured| measured.distance[0] > tolerance) {
+            if !overlap
+                .iter()
+                .any(|measured| measured.distance[0] > tolerance)
+            {
                 self.undo(arena, kept);
                 return false;
             }
-            if overlap.iter().any(|measured| measured.distance[0] < -tolerance) {
+            if overlap
+                .iter()
+                .any(|measured| measured.distance[0] < -tolerance)
+            {
                 let before = self.arena.len();
-                split(overlap, after, &mut self.arena, 0, tolerance, Side::crossing(occluder));
+                split(
+                    overlap,
+                    after,
+                    &mut self.arena,
+                    0,
+                    tolerance,
+                    Side::crossing(occluder),
+                );
                 std::mem::swap(overlap, after);
                 self.next.extend(Piece::from(&self.arena, before));
                 self.crossed = true;
             }
         }
-        if overlap.len() < 3 || twice_area(overlap.iter().map(|m| m.corner.point)) <= 2.0 * NEGLIGIBLE_AREA
+        if overlap.len() < 3
+            || twice_area(overlap.iter().map(|m| m.corner.point)) <= 2.0 * NEGLIGIBLE_AREA
         {
             self.undo(arena, kept);
             return false;
@@ -234,7 +255,11 @@ impl Piece {
             min = min.min(corner.point);
             max = max.max(corner.point);
         }
-        Some(Self { corners: start as u32..arena.len() as u32, min, max })
+        Some(Self {
+            corners: start as u32..arena.len() as u32,
+            min,
+            max,
+        })
     }
 
     #[inline(always)]
@@ -278,7 +303,9 @@ fn separated_by_sides(piece: &[Measured], outline: &[DVec2]) -> bool {
         let direction = end - start;
         let tolerance = super::sides::ON_LINE * (direction.x.abs() + direction.y.abs());
         let origin = std::mem::replace(&mut start, end);
-        outline.iter().all(|&point| cross(direction, point - origin) <= tolerance)
+        outline
+            .iter()
+            .all(|&point| cross(direction, point - origin) <= tolerance)
     })
 }
 
@@ -302,12 +329,21 @@ fn split(
         if d_here >= -tolerance {
             let leaves = d_here <= tolerance && d_there < -tolerance;
             let along = if leaves { side } else { here.corner.side };
-            inside.push(Measured { corner: Corner { side: along, ..here.corner }, ..*here });
+            inside.push(Measured {
+                corner: Corner {
+                    side: along,
+                    ..here.corner
+                },
+                ..*here
+            });
         }
         if d_here <= tolerance {
             let leaves = d_here >= -tolerance && d_there > tolerance;
             let along = if leaves { side } else { here.corner.side };
-            outside.push(Corner { side: along, ..here.corner });
+            outside.push(Corner {
+                side: along,
+                ..here.corner
+            });
         }
         let leaves = d_here > tolerance && d_there < -tolerance;
         let enters = d_here < -tolerance && d_there > tolerance;
@@ -318,10 +354,22 @@ fn split(
                 here.distance[other] + (there.distance[other] - here.distance[other]) * share
             });
             distance[lane] = 0.0;
-            let (within, without) =
-                if leaves { (side, here.corner.side) } else { (here.corner.side, side) };
-            inside.push(Measured { corner: Corner { point, side: within }, distance });
-            outside.push(Corner { point, side: without });
+            let (within, without) = if leaves {
+                (side, here.corner.side)
+            } else {
+                (here.corner.side, side)
+            };
+            inside.push(Measured {
+                corner: Corner {
+                    point,
+                    side: within,
+                },
+                distance,
+            });
+            outside.push(Corner {
+                point,
+                side: without,
+            });
         }
         here = there;
     }

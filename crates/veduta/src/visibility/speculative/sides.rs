@@ -55,7 +55,12 @@ impl Sides {
         let dx = f64x4::from(end.map(|p| p.x)) - x;
         let dy = f64x4::from(end.map(|p| p.y)) - y;
         let tolerance = (dx.abs() + dy.abs()) * f64x4::splat(ON_LINE);
-        Self { start: [x, y], direction: [dx, dy], tolerance, count }
+        Self {
+            start: [x, y],
+            direction: [dx, dy],
+            tolerance,
+            count,
+        }
     }
 
     /// Distance of a point from each line, times the side's length: positive inside, exactly zero
@@ -79,5 +84,7 @@ impl Sides {
 
 /// Whether a side of `outline` after its first four separates it from `points`.
 pub(super) fn later_sides_separate(outline: &[DVec2], points: &[DVec2]) -> bool {
-    (LANES..outline.len()).step_by(LANES).any(|first| Sides::group(outline, first).separate(points))
+    (LANES..outline.len())
+        .step_by(LANES)
+        .any(|first| Sides::group(outline, first).separate(points))
 }
