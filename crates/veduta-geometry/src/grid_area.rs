@@ -25,7 +25,7 @@
 //! buffer, but for rows with a vertex in them.
 
 use crate::{DVec2, cross};
-use std::ops::{AddAssign, Range, Sub, SubAssign};
+use std::ops::{AddAssign, Mul, Range, Sub, SubAssign};
 
 /// Cells that a polygon covers, in one row. Column `k`, row `j` is the square `[k, k+1) x [j, j+1)`.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,7 +129,9 @@ impl GridAreas {
 
 /// What is measured of a region of a cell: its area, or its area and first moments. Coordinates are
 /// relative to the cell's top left corner.
-trait Measure: Copy + Default + AddAssign + SubAssign + Sub<Output = Self> {
+trait Measure:
+    Copy + Default + AddAssign + SubAssign + Sub<Output = Self> + Mul<f64, Output = Self>
+{
     /// The whole width of the cell from `top` to `bottom`.
     fn full_width(top: f64, bottom: f64) -> Self;
     /// What lies between a segment, from `upper` down to `lower`, and the right side of the cell.
@@ -216,6 +218,17 @@ impl SubAssign for CellArea {
     }
 }
 
+impl Mul<f64> for CellArea {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            area: self.area * factor,
+            moment: self.moment * factor,
+        }
+    }
+}
+
 impl Sub for CellArea {
     type Output = Self;
     #[inline(always)]
@@ -252,7 +265,7 @@ fn walk<A: Measure>(
     };
     let start = extent.min.y.max(f64::from(rows.start));
     let end = extent.max.y.min(f64::from(rows.end));
-    if !(start < end) {
+    if start >= end {
         return;
     }
 
@@ -274,58 +287,72 @@ fn walk<A: Measure>(
     // Positively wound with y downwards: the right chain runs along the polygon, the left against.
     let mut left = Chain::new(polygon, &extent, polygon.len() - 1);
     let mut right = Chain::new(polygon, &extent, 1);
-    left.enter(start);
-    right.enter(start);
     let mut y = start;
     let mut row = row;
+    let mut row_top = corner.y;
+    let mut from_row_top = y == row_top;
     while y < end {
-        let row_top = f64::from(row);
-        let row_bottom = row_top + 1.0;
-        let no_vertex_in_row =
-            y == row_top && row_bottom <= left.end.y && row_bottom <= right.end.y;
-        if no_vertex_in_row && row_bottom <= end {
-            let (a, b) = segments(&mut left, &mut right, row_bottom);
-            if a.last < b.first {
-                a.each_cell(0.0, 1.0, |column, area| {
-                    visit(Cells::Boundary {
-                        column: column as u32,
-                        row,
-                        area,
-                    });
-                });
-                if a.last + 1 < b.first {
-                    let columns = (a.last + 1) as u32..b.first as u32;
-                    visit(Cells::Inside { row, columns });
-                }
-                b.each_cell(0.0, 1.0, |column, area| {
-                    visit(Cells::Boundary {
-                        column: column as u32,
-                        row,
-                        area: A::full_width(0.0, 1.0) - area,
-                    });
-                });
-            } else {
-                buffer.add(&a, &b, 0.0, 1.0);
-                buffer.flush(row, true, &mut visit);
-            }
-            y = row_bottom;
-        } else {
-            let whole_row = y == row_top && row_bottom <= end;
-            let row_end = row_bottom.min(end);
-            while y < row_end {
-                left.enter(y);
-                right.enter(y);
-                let bottom = row_end.min(left.end.y).min(right.end.y);
-                let (a, b) = segments(&mut left, &mut right, bottom);
-                buffer.add(&a, &b, y - row_top, bottom - row_top);
-                y = bottom;
-            }
-            buffer.flush(row, whole_row, &mut visit);
-        }
         left.enter(y);
         right.enter(y);
-        row += 1;
+        let vertex = min(end, min(left.end.y, right.end.y));
+
+        // Rows without a vertex, in which the chains have no cell in common.
+        while y == row_top && row_top + 1.0 <= vertex {
+            let (a, b) = (left.segment(row_top + 1.0), right.segment(row_top + 1.0));
+            if a.last >= b.first {
+                break;
+            }
+            let whole = A::full_width(0.0, 1.0);
+            a.each_cell(0.0, 1.0, |column, area| {
+                let column = column as u32;
+                visit(Cells::Boundary { column, row, area });
+            });
+            if a.last + 1 < b.first {
+                let columns = (a.last + 1) as u32..b.first as u32;
+                visit(Cells::Inside { row, columns });
+            }
+            b.each_cell(0.0, 1.0, |column, area| {
+                let (column, area) = (column as u32, whole - area);
+                visit(Cells::Boundary { column, row, area });
+            });
+            left.at = a.lower;
+            right.at = b.lower;
+            row += 1;
+            row_top += 1.0;
+            y = row_top;
+            from_row_top = true;
+        }
+        if y >= vertex {
+            continue;
+        }
+
+        // A strip of any other row.
+        let bottom = min(vertex, row_top + 1.0);
+        let (a, b) = (left.segment(bottom), right.segment(bottom));
+        left.at = a.lower;
+        right.at = b.lower;
+        buffer.add(&a, &b.not_left_of(&a), y - row_top, bottom - row_top);
+        y = bottom;
+        let to_row_bottom = y == row_top + 1.0;
+        if to_row_bottom || y >= end {
+            buffer.flush(row, from_row_top && to_row_bottom, &mut visit);
+            row += 1;
+            row_top += 1.0;
+            from_row_top = true;
+        }
     }
+}
+
+/// The smaller of two numbers: [`f64::min`] would also see to NaN, in several instructions.
+#[inline(always)]
+fn min(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers.
+#[inline(always)]
+fn max(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Area, and moments, of a polygon inside the cell at `corner`.
@@ -358,8 +385,8 @@ impl Extent {
             bottom: 0,
         };
         for (index, vertex) in polygon.iter().enumerate().skip(1) {
-            extent.min.x = extent.min.x.min(vertex.x);
-            extent.max.x = extent.max.x.max(vertex.x);
+            extent.min.x = min(extent.min.x, vertex.x);
+            extent.max.x = max(extent.max.x, vertex.x);
             if vertex.y < extent.min.y {
                 extent.min.y = vertex.y;
                 extent.top = index;
@@ -386,8 +413,8 @@ struct Chain<'a> {
     end: DVec2,
     /// dx/dy of the current edge.
     slope: f64,
-    /// Where the chain is at the present height.
-    x: f64,
+    /// The present place.
+    at: Place,
 }
 
 impl<'a> Chain<'a> {
@@ -402,7 +429,7 @@ impl<'a> Chain<'a> {
             start: top,
             end: top,
             slope: 0.0,
-            x: top.x,
+            at: Place::new(top.x),
         }
     }
 
@@ -410,13 +437,9 @@ impl<'a> Chain<'a> {
     /// horizontal, or lead upwards by a rounding error, or have ended.
     #[inline(always)]
     fn enter(&mut self, y: f64) {
-        if self.end.y <= y {
-            self.next_edge(y);
+        if self.end.y > y || self.next == self.bottom {
+            return;
         }
-    }
-
-    #[inline(never)]
-    fn next_edge(&mut self, y: f64) {
         while self.end.y <= y && self.next != self.bottom {
             self.next += self.step;
             if self.next >= self.polygon.len() {
@@ -427,38 +450,54 @@ impl<'a> Chain<'a> {
         }
         let down = self.end - self.start;
         self.slope = if down.y > 0.0 { down.x / down.y } else { 0.0 };
-        self.x = self.at(y);
+        self.at = self.place(y);
     }
 
     /// Where the current edge is at height `y`, kept between its ends.
     #[inline(always)]
-    fn at(&self, y: f64) -> f64 {
-        let x = self.start.x + (y - self.start.y) * self.slope;
-        let x = x
-            .max(self.start.x.min(self.end.x))
-            .min(self.start.x.max(self.end.x));
+    fn place(&self, y: f64) -> Place {
         // So that the chains meet in their common vertices to the last bit.
-        if y >= self.end.y { self.end.x } else { x }
+        if y >= self.end.y {
+            return Place::new(self.end.x);
+        }
+        let (a, b) = (self.start.x, self.end.x);
+        let x = a + (y - self.start.y) * self.slope;
+        Place::new(min(max(x, min(a, b)), max(a, b)))
+    }
+
+    /// From the present place down to height `bottom`, which is on the current edge.
+    #[inline(always)]
+    fn segment(&self, bottom: f64) -> Segment {
+        Segment::new(self.at, self.place(bottom))
     }
 }
 
-/// Moves both chains down to height `bottom`, within their present edges, and returns the segments
-/// passed. Rounding may put the right one left of the left one; then it is moved onto it.
-#[inline(always)]
-fn segments(left: &mut Chain, right: &mut Chain, bottom: f64) -> (Segment, Segment) {
-    let (left_x, right_x) = (left.at(bottom), right.at(bottom));
-    let a = Segment::new(left.x, left_x);
-    let b = Segment::new(right.x.max(left.x), right_x.max(left_x));
-    left.x = left_x;
-    right.x = right_x;
-    (a, b)
+/// A place on the border of two rows or strips.
+#[derive(Clone, Copy)]
+struct Place {
+    x: f64,
+    /// The column of `x`, and the column before if `x` is on the border between them.
+    column: i32,
+    column_before: i32,
+}
+
+impl Place {
+    #[inline(always)]
+    fn new(x: f64) -> Self {
+        let column = x as i32;
+        Self {
+            x,
+            column,
+            column_before: column - i32::from(f64::from(column) == x),
+        }
+    }
 }
 
 /// A piece of an edge within a row, from the top of a strip to its bottom.
 #[derive(Clone, Copy)]
 struct Segment {
-    upper_x: f64,
-    lower_x: f64,
+    upper: Place,
+    lower: Place,
     /// The columns it passes through: those before `first` lie left of it, those after `last` right.
     /// A segment on the border between two columns passes through none, and `last == first - 1`.
     first: i32,
@@ -467,15 +506,20 @@ struct Segment {
 
 impl Segment {
     #[inline(always)]
-    fn new(upper_x: f64, lower_x: f64) -> Self {
-        let (min, max) = (upper_x.min(lower_x), upper_x.max(lower_x));
-        let floor = max as i32;
+    fn new(upper: Place, lower: Place) -> Self {
         Self {
-            upper_x,
-            lower_x,
-            first: min as i32,
-            last: floor - i32::from(f64::from(floor) == max),
+            upper,
+            lower,
+            first: upper.column.min(lower.column),
+            last: upper.column_before.max(lower.column_before),
         }
+    }
+
+    /// The right one of two segments, where rounding may have put it left of the other.
+    #[inline(always)]
+    fn not_left_of(&self, left: &Segment) -> Segment {
+        let right = |a: Place, b: Place| if b.x < a.x { a } else { b };
+        Segment::new(right(left.upper, self.upper), right(left.lower, self.lower))
     }
 
     /// Calls `visit` with each column the segment passes through, left to right, and with what lies
@@ -484,45 +528,38 @@ impl Segment {
     fn each_cell<A: Measure>(&self, top: f64, bottom: f64, mut visit: impl FnMut(i32, A)) {
         if self.first == self.last {
             let x = f64::from(self.first);
-            visit(
-                self.first,
-                A::right_of(
-                    DVec2::new(self.upper_x - x, top),
-                    DVec2::new(self.lower_x - x, bottom),
-                ),
-            );
-        } else if self.upper_x < self.lower_x {
-            let slope = (bottom - top) / (self.lower_x - self.upper_x);
-            let mut upper = DVec2::new(self.upper_x, top);
-            for column in self.first..=self.last {
-                let x = f64::from(column);
-                let lower = if column == self.last {
-                    DVec2::new(self.lower_x, bottom)
-                } else {
-                    let y = top + (x + 1.0 - self.upper_x) * slope;
-                    DVec2::new(x + 1.0, y.min(bottom))
-                };
-                let mut area = A::full_width(top, upper.y);
-                area += A::right_of(upper - DVec2::new(x, 0.0), lower - DVec2::new(x, 0.0));
-                visit(column, area);
-                upper = lower;
-            }
+            let upper = DVec2::new(self.upper.x - x, top);
+            let lower = DVec2::new(self.lower.x - x, bottom);
+            visit(self.first, A::right_of(upper, lower));
+            return;
+        }
+        if self.last < self.first {
+            return;
+        }
+        // From the left end to the right one. If that leads upwards, all heights change their sign,
+        // and with them all areas.
+        let downwards = self.upper.x < self.lower.x;
+        let (start, end, sign) = if downwards {
+            let start = DVec2::new(self.upper.x, top);
+            (start, DVec2::new(self.lower.x, bottom), 1.0)
         } else {
-            let slope = (bottom - top) / (self.upper_x - self.lower_x);
-            let mut lower = DVec2::new(self.lower_x, bottom);
-            for column in self.first..=self.last {
-                let x = f64::from(column);
-                let upper = if column == self.last {
-                    DVec2::new(self.upper_x, top)
-                } else {
-                    let y = top + (self.upper_x - (x + 1.0)) * slope;
-                    DVec2::new(x + 1.0, y.min(bottom))
-                };
-                let mut area = A::full_width(lower.y, bottom);
-                area += A::right_of(upper - DVec2::new(x, 0.0), lower - DVec2::new(x, 0.0));
-                visit(column, area);
-                lower = upper;
-            }
+            let start = DVec2::new(self.lower.x, bottom);
+            (start, DVec2::new(self.upper.x, top), -1.0)
+        };
+        let slope = (end.y - start.y) / (end.x - start.x);
+        let mut entry = start;
+        for column in self.first..=self.last {
+            let x = f64::from(column);
+            let exit = if column == self.last {
+                end
+            } else {
+                DVec2::new(x + 1.0, start.y + (x + 1.0 - start.x) * slope)
+            };
+            let corner = DVec2::new(x, 0.0);
+            let mut area = A::full_width(start.y, entry.y);
+            area += A::right_of(entry - corner, exit - corner);
+            visit(column, area * sign);
+            entry = exit;
         }
     }
 }
@@ -635,7 +672,9 @@ mod tests {
             } else {
                 3 + (self.unit() * 5.0) as usize
             };
-            let mut angles: Vec<f64> = (0..corners).map(|_| self.unit() * 6.283).collect();
+            let mut angles: Vec<f64> = (0..corners)
+                .map(|_| self.unit() * std::f64::consts::TAU)
+                .collect();
             angles.sort_by(f64::total_cmp);
             let mut polygon: Vec<DVec2> = angles
                 .iter()

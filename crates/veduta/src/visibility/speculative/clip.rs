@@ -3,11 +3,12 @@
 //! No face depends on another's result, so the order in which they are taken changes nothing.
 
 use super::cells::CellLists;
+use super::found::Pile;
 use super::grid::{Extent, Grid};
-use super::pieces::{Depth, Pieces, crossing_tolerance};
+use super::pieces::{Corner, Depth, Pieces, crossing_tolerance};
 use super::sides::{Sides, later_sides_separate};
 use veduta_geometry::{Affine, DVec2};
-use veduta_map::{FaceId, Faces, Fragment};
+use veduta_map::{FaceId, Faces};
 
 /// What all clips share.
 #[derive(Clone, Copy)]
@@ -22,7 +23,7 @@ pub(super) struct Clipper<'a> {
     context: Context<'a>,
     pub pieces: Pieces,
     /// Whether a face in the same plane hid something of this one.
-    pub tied: bool,
+    tied: bool,
     /// For each face, the last face it was compared with: a pair may meet in several cells.
     ///
     /// Ids are kept plus one: memory that is zero from the start costs nothing until it is used.
@@ -47,18 +48,24 @@ impl<'a> Clipper<'a> {
         self.subtract_listed(face, lists, |_| true);
     }
 
-    /// Makes `self.pieces` the fragments of `face` found before.
-    pub fn resume<'f>(&mut self, face: FaceId, fragments: impl Iterator<Item = Fragment<'f>>) {
+    /// Makes `self.pieces` the fragments of `face` found before; one without corners is all of it.
+    pub fn resume<'f>(&mut self, face: FaceId, fragments: impl Iterator<Item = &'f [Corner]>) {
         self.tied = false;
         self.pieces.clear();
-        for fragment in fragments {
-            match fragment {
-                Fragment::Whole(_) => self.pieces.start(face, self.context.faces.outline(face)),
-                Fragment::Cut {
-                    vertices, sides, ..
-                } => self.pieces.add(vertices, sides),
+        for corners in fragments {
+            if corners.is_empty() {
+                self.pieces.start(face, self.context.faces.outline(face));
+            } else {
+                self.pieces.add(corners);
             }
         }
+    }
+
+    /// Adds to `pile` what is left of `face`.
+    pub fn store(&self, face: FaceId, pile: &mut Pile) {
+        pile.push(face, &self.pieces);
+        pile.pierced += usize::from(self.pieces.crossed());
+        pile.tied += usize::from(self.tied);
     }
 
     /// Takes from `self.pieces`, which are of `face`, what the faces listed in its cells hide;

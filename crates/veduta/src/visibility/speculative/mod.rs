@@ -18,6 +18,7 @@
 
 mod cells;
 mod clip;
+mod found;
 mod grid;
 mod guess;
 mod mend;
@@ -28,10 +29,11 @@ mod verify;
 use super::Seen;
 use cells::{CellLists, listed_between};
 use clip::{Clipper, Context};
+use found::{Found, Pile};
 use grid::{Extent, Grid};
 use rayon::prelude::*;
-use veduta_geometry::DVec2;
-use veduta_map::{FaceId, Faces, Fragments};
+use veduta_geometry::{Affine, DVec2};
+use veduta_map::{FaceId, Faces};
 use verify::{Scratch, Verification};
 
 /// How the engine works; what it finds does not depend on it, but for the cuts inside a face.
@@ -97,32 +99,33 @@ pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
         candidates: candidates.len(),
         ..Report::default()
     };
-    let clipped = clip_all(
+    let mut found = Found::default();
+    let in_order = by_place(&context, &candidates);
+    clip_all(
         &context,
-        &candidates,
+        &in_order,
         &[&lists],
-        |scratch, polygon, plane| {
-            verification.add(&context, scratch, &thresholds, polygon, plane, |cell| {
+        &mut found,
+        &mut report,
+        |scratch, piece, plane| {
+            verification.add(&context, scratch, &thresholds, piece, plane, |cell| {
                 lists.guessed(cell)
             });
         },
     );
-    let mut seen = clipped.seen;
-    report.pierced += clipped.pierced;
-    report.tied += clipped.tied;
-
     if settings.guess {
+        let verification = &verification;
         mend::mend(
             &context,
             lists,
-            &candidates,
+            candidates,
             &mut thresholds,
             verification,
-            &mut seen,
+            &mut found,
             &mut report,
         );
     }
-    (seen, report)
+    (found.into_seen(faces), report)
 }
 
 /// Samples of the guess along each side of a cell.
@@ -147,58 +150,54 @@ fn choose_grid(faces: usize, settings: &Settings) -> Grid {
 /// Candidates clipped by a task at a time.
 const FACES_PER_TASK: usize = 512;
 
-/// What is left of some candidates.
-#[derive(Default)]
-struct Clipped {
-    seen: Seen,
-    pierced: usize,
-    tied: usize,
-}
-
-impl Clipped {
-    fn append(&mut self, other: &Clipped) {
-        self.seen.opaque.append(&other.seen.opaque);
-        self.seen.veils.append(&other.seen.veils);
-        self.pierced += other.pierced;
-        self.tied += other.tied;
-    }
-
-    /// Takes over what the clipper has left of `face`.
-    fn push(&mut self, faces: &Faces, face: FaceId, clipper: &Clipper) {
-        let pieces = &clipper.pieces;
-        self.pierced += usize::from(pieces.crossed());
-        self.tied += usize::from(clipper.tied);
-        let fragments: &mut Fragments = if faces.is_veil(face) {
-            &mut self.seen.veils
-        } else {
-            &mut self.seen.opaque
-        };
-        if !pieces.touched() {
-            fragments.push_whole(face);
-            return;
-        }
-        for piece in pieces.iter() {
-            fragments.push_cut(face, piece.iter().map(|corner| (corner.point, corner.side)));
-        }
+impl Report {
+    fn count(&mut self, pile: &Pile) {
+        self.pierced += pile.pierced;
+        self.tied += pile.tied;
     }
 }
 
-/// Clips `candidates` by the faces of `lists`, and hands each opaque piece to `see`.
+/// The candidates in the order of the cells they begin in: what is compared lies together.
+fn by_place(context: &Context, candidates: &[FaceId]) -> Vec<FaceId> {
+    let cell_of = |face: FaceId| {
+        let span = context.grid.span(&context.extents[face.index()]);
+        context.grid.index(span.columns[0], span.rows[0])
+    };
+    let mut next = vec![0_u32; context.grid.cells() + 1];
+    for &face in candidates {
+        next[cell_of(face) + 1] += 1;
+    }
+    for cell in 1..next.len() {
+        next[cell] += next[cell - 1];
+    }
+    let mut in_order = vec![FaceId(0); candidates.len()];
+    for &face in candidates {
+        let place = &mut next[cell_of(face)];
+        in_order[*place as usize] = face;
+        *place += 1;
+    }
+    in_order
+}
+
+/// Clips `candidates` by the faces of `lists`, adds what is left to `found`, and hands each opaque
+/// piece to `see`.
 fn clip_all(
     context: &Context,
     candidates: &[FaceId],
     lists: &[&CellLists],
-    see: impl Fn(&mut Scratch, &mut dyn Iterator<Item = DVec2>, &veduta_geometry::Affine) + Sync,
-) -> Clipped {
-    let parts: Vec<Clipped> = candidates
+    found: &mut Found,
+    report: &mut Report,
+    see: impl Fn(&mut Scratch, &mut dyn Iterator<Item = DVec2>, &Affine) + Sync,
+) {
+    let piles: Vec<Pile> = candidates
         .par_chunks(FACES_PER_TASK)
         .map_init(
             || (Clipper::new(*context), Scratch::default()),
             |(clipper, scratch), candidates| {
-                let mut clipped = Clipped::default();
+                let mut pile = Pile::default();
                 for &face in candidates {
                     clipper.clip(face, lists);
-                    clipped.push(context.faces, face, clipper);
+                    clipper.store(face, &mut pile);
                     if !context.faces.is_veil(face) {
                         let plane = context.faces.face_nearness(face);
                         for piece in clipper.pieces.iter() {
@@ -206,13 +205,12 @@ fn clip_all(
                         }
                     }
                 }
-                clipped
+                pile
             },
         )
         .collect();
-    let mut all = Clipped::default();
-    for part in &parts {
-        all.append(part);
+    for pile in piles {
+        report.count(&pile);
+        found.add(pile);
     }
-    all
 }

@@ -86,13 +86,9 @@ impl Pieces {
     }
 
     /// Adds a piece found before.
-    pub fn add(&mut self, points: &[DVec2], sides: &[Side]) {
+    pub fn add(&mut self, corners: &[Corner]) {
         let start = self.arena.len();
-        let corners = points
-            .iter()
-            .zip(sides)
-            .map(|(&point, &side)| Corner { point, side });
-        self.arena.extend(corners);
+        self.arena.extend_from_slice(corners);
         self.pieces.extend(Piece::from(&self.arena, start));
     }
 

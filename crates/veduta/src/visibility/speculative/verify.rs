@@ -5,7 +5,6 @@
 
 use super::clip::Context;
 use super::guess::OPEN;
-use std::ops::Range;
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 use veduta_geometry::{Affine, Cells, DVec2, GridAreas};
 
@@ -129,12 +128,11 @@ impl Verification {
         &self,
         thresholds: &mut [f32],
         failed_before: &mut [bool],
-        cells: Range<usize>,
         guessed: impl Fn(usize) -> bool,
     ) -> Vec<usize> {
         let full = (COVERAGE_UNIT * (1.0 - COVERAGE_TOLERANCE)) as i64;
         let mut wrong = Vec::new();
-        for cell in cells {
+        for cell in 0..thresholds.len() {
             if thresholds[cell] == OPEN || !guessed(cell) {
                 continue;
             }
