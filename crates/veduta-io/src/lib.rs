@@ -8,8 +8,14 @@
 //! Each format is behind a feature of its name; all are on by default.
 
 mod read;
+pub mod tone;
+mod write;
 
 pub use read::{
     ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
     read_scene,
+};
+pub use write::{
+    PICTURE_SUFFIXES, PictureFormat, PictureOptions, PngDepth, WriteError, WriteProblem,
+    remove_unfinished, write_picture,
 };
