@@ -7,6 +7,8 @@ pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec2, Vec3, Vec4};
 
 mod affine;
 mod convex;
+mod grid_area;
 
 pub use affine::Affine;
 pub use convex::{cross, signed_area};
+pub use grid_area::{CellArea, Cells, GridAreas};

@@ -70,7 +70,7 @@ impl Faces {
             "a face needs a plane of this table"
         );
         let area = veduta_geometry::signed_area(outline);
-        if !(area.abs() > 0.0) {
+        if area == 0.0 || !area.is_finite() {
             return None;
         }
         if self.outline_start.is_empty() {

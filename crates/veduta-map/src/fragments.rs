@@ -130,19 +130,36 @@ impl Fragments {
         }
     }
 
-    /// Appends all of `other`, whose faces must not be smaller than the last one here.
-    pub fn append(&mut self, other: &Fragments) {
-        let first = u32::try_from(self.vertices.len() + other.vertices.len())
-            .expect("at most u32::MAX vertices")
-            - other.vertices.len() as u32;
-        self.entries.extend(
-            other
-                .entries
-                .iter()
-                .map(|&(face, start)| (face, start + first)),
-        );
-        self.vertices.extend_from_slice(&other.vertices);
-        self.sides.extend_from_slice(&other.sides);
+    /// The fragments of all `parts`, one after the other.
+    ///
+    /// # Panics
+    /// If they have more than `u32::MAX` vertices; in debug builds, if faces do not ascend.
+    pub fn concat(parts: &[&Fragments]) -> Self {
+        let count = |rows: fn(&Fragments) -> usize| parts.iter().map(|part| rows(part)).sum();
+        let mut all = Self {
+            entries: Vec::with_capacity(count(|part| part.entries.len())),
+            vertices: Vec::with_capacity(count(|part| part.vertices.len())),
+            sides: Vec::with_capacity(count(|part| part.sides.len())),
+        };
+        u32::try_from(all.vertices.capacity()).expect("at most u32::MAX vertices");
+        for part in parts {
+            debug_assert!(
+                all.entries
+                    .last()
+                    .zip(part.entries.first())
+                    .is_none_or(|(a, b)| a.0 <= b.0),
+                "faces ascend"
+            );
+            let first = all.vertices.len() as u32;
+            all.entries.extend(
+                part.entries
+                    .iter()
+                    .map(|&(face, start)| (face, start + first)),
+            );
+            all.vertices.extend_from_slice(&part.vertices);
+            all.sides.extend_from_slice(&part.sides);
+        }
+        all
     }
 
     /// Number of fragments.

@@ -113,7 +113,7 @@ impl VisibilityMap {
                 let [p, q, r] = [0, 1, 2].map(|step| polygon[(k + step) % polygon.len()]);
                 veduta_geometry::cross(q - p, r - q) < -ROUNDING
             });
-            if !(area > 0.0) || turns_left {
+            if area <= 0.0 || !area.is_finite() || turns_left {
                 return Err(Invariant::NotConvex {
                     fragment: index,
                     face,

@@ -8,7 +8,10 @@
 //! another; `pipeline` alone knows their order.
 
 pub mod accumulate;
+pub mod dice;
+pub mod pipeline;
 pub mod scene;
+pub mod shade;
 pub mod visibility;
 
 pub use veduta_geometry as geometry;

@@ -1,4 +1,10 @@
 //! Parts and their radiance -> pixels.
+//!
+//! The box filter: a pixel is the sum over its parts of area times radiance. It is exact wherever
+//! radiance is constant over a part.
+
+use crate::dice::Parts;
+use crate::shade::Radiance;
 
 /// A picture in linear light: RGBA, colour premultiplied by opacity, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -9,4 +15,47 @@ pub struct Picture {
     pub height: u32,
     /// `width * height` pixels.
     pub pixels: Vec<[f32; 4]>,
+}
+
+/// Sums a band's parts into `pixels`, the band's rows, which are overwritten. `sums` is a buffer.
+///
+/// Sums are f64: a pixel may have thousands of parts (foliage, distant terrain), and the rounding of
+/// as many f32 additions would add up to more than the 1e-5 that a colour may be off.
+pub fn box_filter(
+    parts: &Parts,
+    radiance: &Radiance,
+    sums: &mut Vec<[f64; 4]>,
+    pixels: &mut [[f32; 4]],
+) {
+    sums.clear();
+    sums.resize(pixels.len(), [0.0; 4]);
+    for (part, &[r, g, b]) in parts.boundary.iter().zip(&radiance.boundary) {
+        let area = f64::from(part.area);
+        let value = [r, g, b, 1.0].map(|channel| area * f64::from(channel));
+        add(&mut sums[part.pixel as usize], value);
+    }
+    for (index, run) in parts.runs.iter().enumerate() {
+        let sums = &mut sums[run.pixels()];
+        match radiance.of_run(index) {
+            &[[r, g, b]] => {
+                let value = [r, g, b, 1.0].map(f64::from);
+                sums.iter_mut().for_each(|sum| add(sum, value));
+            }
+            of_pixels => {
+                for (sum, &[r, g, b]) in sums.iter_mut().zip(of_pixels) {
+                    add(sum, [r, g, b, 1.0].map(f64::from));
+                }
+            }
+        }
+    }
+    for (pixel, sum) in pixels.iter_mut().zip(sums) {
+        *pixel = sum.map(|channel| channel as f32);
+    }
+}
+
+#[inline(always)]
+fn add(sum: &mut [f64; 4], value: [f64; 4]) {
+    for (channel, value) in sum.iter_mut().zip(value) {
+        *channel += value;
+    }
 }

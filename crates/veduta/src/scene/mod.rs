@@ -4,6 +4,7 @@
 //! to this, through [`Object::world_from_object`].
 
 mod framing;
+pub mod generate;
 mod material;
 mod mesh;
 

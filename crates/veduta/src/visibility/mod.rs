@@ -1,11 +1,23 @@
 //! Finding visibility: faces in the image plane -> the regions in which each is seen.
 //!
-//! Several engines do the same step, with the same input and output:
+//! [`project`] puts a scene's faces into the image plane. Engines then do the same step, with the
+//! same input and output:
 //!
+//! - [`speculative`], the main one: guess with a z-buffer, clip exactly, verify, mend;
+//! - [`cross_scanline`]: Tanaka & Takahashi's sweep, the oracle of the other;
+//!
+//! and [`multiscan`], which samples on sub-scanlines and returns spans, a type of its own.
 //!
 //! All obey one depth order. At a point of the image plane the face with the larger nearness is in
 //! front, as given by the faces' stored planes; of faces that share a plane the smaller id is.
 //! A crossing of two planes is the zero of [`Affine::minus`](veduta_geometry::Affine::minus).
+
+pub mod cross_scanline;
+pub mod multiscan;
+mod project;
+pub mod speculative;
+
+pub use project::project;
 
 use veduta_map::Fragments;
 

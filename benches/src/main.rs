@@ -1,0 +1,3 @@
+//! Measures the engines against one another.
+
+fn main() {}

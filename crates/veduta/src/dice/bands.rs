@@ -1,0 +1,109 @@
+use crate::dice::PixelGrid;
+use rayon::prelude::*;
+use std::ops::Range;
+use veduta_geometry::DVec2;
+use veduta_map::{Fragments, VisibilityMap};
+
+/// Rows of pixels in a band. More would leave cores idle and caches full on large pictures; fewer
+/// would visit fragments more often, once for each band that they touch.
+pub const BAND_ROWS: u32 = 16;
+
+/// Which fragments touch which band of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bands {
+    grid: PixelGrid,
+    /// `fragments[start[b]..start[b + 1]]` touch band `b`, ascending.
+    start: Vec<usize>,
+    fragments: Vec<u32>,
+}
+
+impl Bands {
+    /// Sorts the opaque fragments of `map` into the bands of `grid` (a counting sort).
+    pub fn new(map: &VisibilityMap, grid: PixelGrid) -> Self {
+        assert!(
+            grid.pixels_per_frame.cmpgt(DVec2::ZERO).all(),
+            "a grid's scale is positive"
+        );
+        let count = grid.height.div_ceil(BAND_ROWS) as usize;
+        let touched: Vec<Range<u32>> = (0..map.opaque.len())
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|fragment| bands_touched(map, &map.opaque, fragment, &grid))
+            .collect();
+
+        let mut start = vec![0; count + 1];
+        for bands in &touched {
+            for band in bands.clone() {
+                start[band as usize + 1] += 1;
+            }
+        }
+        for band in 0..count {
+            start[band + 1] += start[band];
+        }
+        let mut next = start.clone();
+        let mut fragments = vec![0; start[count]];
+        for (fragment, bands) in touched.iter().enumerate() {
+            for band in bands.clone() {
+                let place = &mut next[band as usize];
+                fragments[*place] = fragment as u32;
+                *place += 1;
+            }
+        }
+        Self {
+            grid,
+            start,
+            fragments,
+        }
+    }
+
+    /// The grid that is cut into bands.
+    pub fn grid(&self) -> &PixelGrid {
+        &self.grid
+    }
+
+    /// Number of bands.
+    pub fn len(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// Whether there are no bands. There is always one.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Rows of the grid in band `band`.
+    pub fn rows(&self, band: usize) -> Range<u32> {
+        let first = band as u32 * BAND_ROWS;
+        first..(first + BAND_ROWS).min(self.grid.height)
+    }
+
+    /// Opaque fragments that touch band `band`, ascending.
+    pub fn fragments(&self, band: usize) -> &[u32] {
+        &self.fragments[self.start[band]..self.start[band + 1]]
+    }
+}
+
+/// The bands that the box around a fragment touches; none if it lies outside the grid.
+fn bands_touched(
+    map: &VisibilityMap,
+    fragments: &Fragments,
+    fragment: usize,
+    grid: &PixelGrid,
+) -> Range<u32> {
+    let polygon = map.polygon(fragments.get(fragment));
+    let mut min = polygon[0];
+    let mut max = polygon[0];
+    for &vertex in &polygon[1..] {
+        min = min.min(vertex);
+        max = max.max(vertex);
+    }
+    let min = grid.pixels_from_image(min);
+    let max = grid.pixels_from_image(max);
+    let (width, height) = (f64::from(grid.width), f64::from(grid.height));
+    if min.x >= width || max.x <= 0.0 || min.y >= height || max.y <= 0.0 {
+        return 0..0;
+    }
+    let first = min.y.max(0.0) as u32;
+    let last = max.y.min(height - 1.0) as u32;
+    first / BAND_ROWS..last / BAND_ROWS + 1
+}

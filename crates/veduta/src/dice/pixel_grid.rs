@@ -1,0 +1,66 @@
+use veduta_geometry::DVec2;
+
+/// A grid of pixels on the image plane.
+///
+/// Pixel `(i, j)` covers `[i, i+1) x [j, j+1)` in pixel coordinates, which are
+/// `pixels_per_frame * image - origin`. Picture size, zoom, unequal scale, pan and window are all
+/// such a map, and none of them needs visibility again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelGrid {
+    /// Columns of pixels, at least 1.
+    pub width: u32,
+    /// Rows of pixels, at least 1.
+    pub height: u32,
+    /// Pixels along the width and the height of the frame (the unit square); positive.
+    pub pixels_per_frame: DVec2,
+    /// Where the grid's top left corner lies in the frame, in pixels.
+    pub origin: DVec2,
+}
+
+impl PixelGrid {
+    /// `width` x `height` pixels that fill the frame.
+    ///
+    /// # Panics
+    /// If either is 0.
+    pub fn of_frame(width: u32, height: u32) -> Self {
+        assert!(width > 0 && height > 0, "a picture has pixels");
+        Self {
+            width,
+            height,
+            pixels_per_frame: DVec2::new(f64::from(width), f64::from(height)),
+            origin: DVec2::ZERO,
+        }
+    }
+
+    /// The `width` x `height` pixels of this grid from column `left` and row `top` on. They may lie
+    /// outside it, where nothing is seen beyond the frame.
+    ///
+    /// # Panics
+    /// If `width` or `height` is 0.
+    pub fn window(&self, left: f64, top: f64, width: u32, height: u32) -> Self {
+        assert!(width > 0 && height > 0, "a window has pixels");
+        Self {
+            width,
+            height,
+            origin: self.origin + DVec2::new(left, top),
+            ..*self
+        }
+    }
+
+    /// Pixel coordinates of an image point.
+    #[inline(always)]
+    pub fn pixels_from_image(&self, image: DVec2) -> DVec2 {
+        image * self.pixels_per_frame - self.origin
+    }
+
+    /// The image point at pixel coordinates.
+    #[inline(always)]
+    pub fn image_from_pixels(&self, pixels: DVec2) -> DVec2 {
+        (pixels + self.origin) / self.pixels_per_frame
+    }
+
+    /// Number of pixels.
+    pub fn pixel_count(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}

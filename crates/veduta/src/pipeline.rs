@@ -1,0 +1,523 @@
+//! The order of the stages: the only file that knows it.
+
+use crate::accumulate::{self, Picture};
+use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid};
+use crate::scene::{AlphaMode, Scene};
+use crate::shade::light::Daylight;
+use crate::shade::{Radiance, Surfaces};
+use crate::visibility::{self, Seen, speculative};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use veduta_map::{Camera, MaterialId, VisibilityMap};
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Width of the picture in pixels, at least 1.
+    pub width: u32,
+    /// Height of the picture in pixels, at least 1.
+    pub height: u32,
+    /// How areas in pixels are found.
+    pub sampling: Sampling,
+    /// Materials show their colour as it is, without light.
+    pub unlit: bool,
+}
+
+impl Default for RenderSettings {
+    /// 1280 x 720, exact, lit.
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            sampling: Sampling::Exact,
+            unlit: false,
+        }
+    }
+}
+
+/// How areas in pixels are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampling {
+    /// Exactly, from a visibility map.
+    #[default]
+    Exact,
+    /// From this many sub-scanlines in each row of pixels, without a map (Nakamae et al.).
+    Multiscan(u32),
+}
+
+/// Something of a scene that its picture does not show as it should.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Shortcoming {
+    /// The material is not fully opaque but was drawn so.
+    DrawnOpaque(MaterialId),
+    /// This many fragments of faces that are not fully opaque were left out.
+    VeilsLeftOut(usize),
+}
+
+/// Finds what `camera` sees of `scene`.
+///
+/// The map has no resolution: pictures of any size are made of it.
+pub fn find_visibility(scene: &Scene, camera: &Camera) -> VisibilityMap {
+    let faces = visibility::project(scene, camera);
+    let settings = speculative::Settings {
+        aspect: camera.aspect(),
+        ..Default::default()
+    };
+    let Seen { opaque, veils } = speculative::find(&faces, &settings);
+    VisibilityMap {
+        camera: *camera,
+        faces,
+        opaque,
+        veils,
+    }
+}
+
+/// Makes the picture that `camera` takes of `scene`.
+///
+/// # Panics
+/// If the size is 0, or the picture is too large for the machine's memory.
+pub fn render(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Picture {
+    render_map(scene, &find_visibility(scene, camera), settings)
+}
+
+/// Makes the picture of a map of `scene`, which must be the scene that the map was made of.
+///
+/// # Panics
+/// If the size is 0, or `settings` ask for other than [`Sampling::Exact`]: a map has no sub-scanlines.
+pub fn render_map(scene: &Scene, map: &VisibilityMap, settings: &RenderSettings) -> Picture {
+    assert!(
+        settings.sampling == Sampling::Exact,
+        "the pixels of a map are found exactly"
+    );
+    let grid = PixelGrid::of_frame(settings.width, settings.height);
+    render_window(scene, map, &grid, settings.unlit)
+}
+
+/// Makes the picture of a map of `scene` on any grid of pixels: scaled, or a window of it.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory.
+pub fn render_window(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Picture {
+    let surfaces = Surfaces::new(scene, map, Daylight::default(), unlit);
+    let bands = Bands::new(map, *grid);
+    let mut picture = Picture {
+        width: grid.width,
+        height: grid.height,
+        pixels: vec![[0.0; 4]; grid.pixel_count()],
+    };
+    let band_pixels = grid.width as usize * BAND_ROWS as usize;
+    picture
+        .pixels
+        .par_chunks_mut(band_pixels)
+        .enumerate()
+        .for_each_init(BandBuffers::default, |buffers, (band, pixels)| {
+            let BandBuffers {
+                dicer,
+                parts,
+                radiance,
+                sums,
+            } = buffers;
+            let varies = |fragment| surfaces.varies(fragment);
+            dice::dice(map, &bands, band, varies, dicer, parts);
+            surfaces.shade(parts, grid, bands.rows(band).start, radiance);
+            accumulate::box_filter(parts, radiance, sums, pixels);
+        });
+    picture
+}
+
+/// What a thread keeps from band to band.
+#[derive(Default)]
+struct BandBuffers {
+    dicer: Dicer,
+    parts: Parts,
+    radiance: Radiance,
+    sums: Vec<[f64; 4]>,
+}
+
+/// What [`render_map`] does not show as it should, in ascending order.
+pub fn shortcomings(scene: &Scene, map: &VisibilityMap) -> Vec<Shortcoming> {
+    let seen: BTreeSet<MaterialId> = (0..map.opaque.len())
+        .map(|fragment| {
+            let face = map.opaque.face(fragment);
+            let mesh = scene.mesh_of(map.faces.object(face));
+            mesh.material_of(map.faces.source(face))
+        })
+        .collect();
+    let drawn_opaque = seen
+        .into_iter()
+        .filter(|&id| scene.material(id).alpha_mode != AlphaMode::Opaque)
+        .map(Shortcoming::DrawnOpaque);
+    let veils = map.veils.len();
+    drawn_opaque
+        .chain((veils > 0).then_some(Shortcoming::VeilsLeftOut(veils)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Image, ImageId, Material, Mesh, MeshId, Object, TextureRef};
+    use veduta_geometry::{DMat4, DVec2, DVec3, Vec2, Vec3};
+    use veduta_map::{Affine, Faces, Fragments, ObjectId, Projection};
+
+    /// A scene of one mesh with one material.
+    fn scene_of(mesh: Mesh, material: Material) -> Scene {
+        let mesh = Mesh {
+            materials: vec![(0, MaterialId(0))],
+            ..mesh
+        };
+        mesh.check().expect("a sound mesh");
+        Scene {
+            objects: vec![Object {
+                name: "object".into(),
+                mesh: MeshId(0),
+                world_from_object: DMat4::IDENTITY,
+            }],
+            meshes: vec![mesh],
+            materials: vec![material],
+            ..Scene::default()
+        }
+    }
+
+    /// The map of a scene whose faces hide nothing of one another and lie before the eye. What lies
+    /// outside the frame is for the window to cut off.
+    fn map_of(scene: &Scene, camera: Camera) -> VisibilityMap {
+        let mut faces = Faces::new();
+        let mut opaque = Fragments::new();
+        let plane = faces.push_plane(Affine::new(0.0, 0.0, 1.0));
+        for (index, object) in scene.objects.iter().enumerate() {
+            let id = ObjectId(index as u32);
+            let mesh = scene.mesh_of(id);
+            let eye_from_object = camera.eye_from_world * object.world_from_object;
+            for (source, triangle) in mesh.triangles.iter().enumerate() {
+                let outline = triangle.map(|corner| {
+                    let position = mesh.positions[corner as usize];
+                    camera.image_from_eye(eye_from_object.transform_point3(position))
+                });
+                let face = faces.push(&outline, plane, id, source as u32);
+                opaque.push_whole(face.expect("no face is seen edge-on"));
+            }
+        }
+        let veils = Fragments::new();
+        VisibilityMap {
+            camera,
+            faces,
+            opaque,
+            veils,
+        }
+    }
+
+    fn perspective(eye: DVec3, tan_half_height: f64, aspect: f64) -> Camera {
+        let projection = Projection::Perspective {
+            tan_half_height,
+            aspect,
+        };
+        Camera::looking(eye, DVec3::ZERO, DVec3::Z, projection, 0.01).expect("a sound camera")
+    }
+
+    fn parallel(eye: DVec3, height: f64, aspect: f64) -> Camera {
+        let projection = Projection::Parallel { height, aspect };
+        Camera::looking(eye, DVec3::ZERO, DVec3::Z, projection, 0.0).expect("a sound camera")
+    }
+
+    /// A square of the ground around the origin, cut into `cells` x `cells` pairs of triangles.
+    fn ground(half: f64, cells: u32) -> Mesh {
+        let mut mesh = Mesh::default();
+        for j in 0..=cells {
+            for i in 0..=cells {
+                let uv = DVec2::new(f64::from(i), f64::from(j)) / f64::from(cells);
+                let flat = (2.0 * uv - 1.0) * half;
+                mesh.positions.push(DVec3::new(flat.x, -flat.y, 0.0));
+                mesh.texcoords.push(uv.as_vec2());
+            }
+        }
+        for j in 0..cells {
+            for i in 0..cells {
+                let first = j * (cells + 1) + i;
+                let [p, q, r, s] = [first, first + 1, first + cells + 1, first + cells + 2];
+                mesh.triangles.push([p, r, q]);
+                mesh.triangles.push([q, r, s]);
+            }
+        }
+        mesh
+    }
+
+    fn unlit(width: u32, height: u32) -> RenderSettings {
+        RenderSettings {
+            width,
+            height,
+            unlit: true,
+            ..RenderSettings::default()
+        }
+    }
+
+    /// 8 x 8 squares of 64 x 64 texels each.
+    fn checker() -> Image {
+        let size = 512;
+        let square = |k: u32| k / 64;
+        Image {
+            name: "checker".into(),
+            width: size,
+            height: size,
+            pixels: (0..size * size)
+                .map(|k| {
+                    let light = (square(k % size) + square(k / size)) % 2 == 0;
+                    [if light { 255 } else { 0 }; 4]
+                })
+                .collect(),
+        }
+    }
+
+    fn textured(mesh: Mesh, image: Image) -> Scene {
+        let material = Material {
+            base_color: [1.0; 4],
+            base_color_texture: Some(TextureRef::new(ImageId(0))),
+            ..Material::default()
+        };
+        Scene {
+            images: vec![image],
+            ..scene_of(mesh, material)
+        }
+    }
+
+    #[test]
+    fn a_white_wall_is_white_to_the_last_pixel() {
+        let material = Material {
+            base_color: [1.0, 0.5, 0.25, 1.0],
+            ..Material::default()
+        };
+        let scene = scene_of(ground(5.0, 40), material);
+        let map = map_of(&scene, parallel(DVec3::new(0.1, -1.0, 4.0), 3.0, 1.5));
+        let picture = render_map(&scene, &map, &unlit(96, 64));
+        for pixel in &picture.pixels {
+            for (value, expected) in pixel.iter().zip([1.0, 0.5, 0.25, 1.0]) {
+                assert!((value - expected).abs() < 1e-6, "{pixel:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_texture_in_perspective_is_where_the_rays_meet_it() {
+        let scene = textured(ground(2.0, 3), checker());
+        for camera in [
+            perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.5),
+            parallel(DVec3::new(1.0, -4.0, 1.5), 2.5, 1.5),
+        ] {
+            let (width, height) = (144_usize, 96_usize);
+            let map = map_of(&scene, camera);
+            let picture = render_map(&scene, &map, &unlit(width as u32, height as u32));
+
+            // What a ray meets, straight from the scene's description: light, dark or nothing.
+            let world_from_eye = camera.eye_from_world.inverse();
+            let seen = |x: f64, y: f64| {
+                let image = DVec2::new(x / width as f64, y / height as f64);
+                let (origin, direction) = camera.eye_ray(image);
+                let origin = world_from_eye.transform_point3(origin);
+                let direction = world_from_eye.transform_vector3(direction);
+                let distance = -origin.z / direction.z;
+                let hit = origin + distance * direction;
+                let uv = DVec2::new(hit.x + 2.0, 2.0 - hit.y) / 4.0;
+                let on_ground =
+                    distance > 0.0 && uv.min_element() >= 0.0 && uv.max_element() <= 1.0;
+                let square = (uv * 8.0).floor();
+                let light = (square.x + square.y) as i64 % 2 == 0;
+                let value = if light { 1.0 } else { 0.0 };
+                if on_ground { [value, 1.0] } else { [0.0; 2] }
+            };
+            const SAMPLES: usize = 16;
+            let supersampled: Vec<[f64; 2]> = (0..width * height)
+                .map(|pixel| {
+                    let mut sum = [0.0; 2];
+                    for sample in 0..SAMPLES * SAMPLES {
+                        let offset = |k: usize| (k as f64 + 0.5) / SAMPLES as f64;
+                        let x = (pixel % width) as f64 + offset(sample % SAMPLES);
+                        let y = (pixel / width) as f64 + offset(sample / SAMPLES);
+                        let [color, alpha] = seen(x, y);
+                        sum[0] += color;
+                        sum[1] += alpha;
+                    }
+                    sum.map(|sum| sum / (SAMPLES * SAMPLES) as f64)
+                })
+                .collect();
+
+            let mut squares = 0.0;
+            let mut edges = 0;
+            for (found, expected) in picture.pixels.iter().zip(&supersampled) {
+                // The outline is exact, the rays' share of it is within a sample along each edge.
+                assert!((f64::from(found[3]) - expected[1]).abs() < 2.0 / SAMPLES as f64);
+                squares += (f64::from(found[0]) - expected[0]).powi(2);
+                edges += usize::from(expected[0] > 0.0 && expected[0] < expected[1]);
+            }
+            // A trilinear look-up blurs an edge a little more than the box filter does: 0.0145 here.
+            let rms = (squares / supersampled.len() as f64).sqrt();
+            assert!(
+                edges > 1000 && rms < 0.02,
+                "off by {rms} with {edges} pixels on edges"
+            );
+
+            let mut plain = 0;
+            for (row, column) in (2..height - 2).flat_map(|j| (2..width - 2).map(move |i| (j, i))) {
+                let around = (row - 2..=row + 2)
+                    .flat_map(|j| (column - 2..=column + 2).map(move |i| j * width + i));
+                let here = supersampled[row * width + column];
+                if here[1] == 1.0 && around.clone().all(|pixel| supersampled[pixel] == here) {
+                    plain += 1;
+                    let found = f64::from(picture.pixels[row * width + column][0]);
+                    assert!((found - here[0]).abs() < 0.02, "{found} at {column}, {row}");
+                }
+            }
+            assert!(plain > 800, "{plain} pixels are away from edges");
+        }
+    }
+
+    #[test]
+    fn a_fine_pattern_far_away_is_grey() {
+        let scene = textured(ground(2.0, 1), checker());
+        let map = map_of(
+            &scene,
+            perspective(DVec3::new(0.0, -500.0, 100.0), 0.003, 1.0),
+        );
+        let picture = render_map(&scene, &map, &unlit(5, 5));
+        let [r, _, _, a] = picture.pixels[12];
+        assert!(
+            (r - 0.5).abs() < 0.01 && a == 1.0,
+            "{:?}",
+            picture.pixels[12]
+        );
+    }
+
+    #[test]
+    fn vertex_colours_and_normals_go_smoothly_over_a_face() {
+        // Colours that are an affine function of the ground: interpolation must give it back.
+        let mut mesh = ground(2.0, 2);
+        let ramp = |p: DVec3| (0.5 + 0.1 * p.x + 0.2 * p.y) as f32;
+        mesh.colors = mesh
+            .positions
+            .iter()
+            .map(|&p| [ramp(p), 0.5, 1.0])
+            .collect();
+        let material = Material {
+            base_color: [1.0; 4],
+            ..Material::default()
+        };
+        let scene = scene_of(mesh, material);
+        let camera = perspective(DVec3::new(1.0, -3.0, 1.5), 0.2, 1.0);
+        let picture = render_map(&scene, &map_of(&scene, camera), &unlit(40, 40));
+        let world_from_eye = camera.eye_from_world.inverse();
+        let eye = world_from_eye.transform_point3(DVec3::ZERO);
+        for (pixel, found) in picture
+            .pixels
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| p[3] > 1.0 - 1e-6)
+        {
+            let image = DVec2::new((pixel % 40) as f64 + 0.5, (pixel / 40) as f64 + 0.5) / 40.0;
+            let direction = world_from_eye.transform_vector3(camera.eye_ray(image).1);
+            let hit = eye - direction * (eye.z / direction.z);
+            // A pixel is the mean of its parts at their centroids, which for an affine function
+            // differs from its value at the pixel's centre by perspective only.
+            assert!(
+                (found[0] - ramp(hit)).abs() < 5e-3,
+                "{found:?} and not {}",
+                ramp(hit)
+            );
+            assert!((found[1] - 0.5).abs() < 1e-6 && (found[2] - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn normals_may_point_either_way() {
+        let material = Material::default;
+        let flat = scene_of(ground(2.0, 2), material());
+        let settings = RenderSettings {
+            unlit: false,
+            ..unlit(20, 20)
+        };
+        for (eye, seen_normal) in [
+            (DVec3::new(0.3, -3.0, 2.0), Vec3::Z),
+            (DVec3::new(0.3, -3.0, -2.0), -Vec3::Z),
+        ] {
+            let camera = perspective(eye, 0.1, 1.0);
+            let expected = render_map(&flat, &map_of(&flat, camera), &settings);
+            let light = 0.6 * Daylight::default().on(seen_normal);
+            assert!(
+                (Vec3::from_slice(&expected.pixels[210]) - light)
+                    .abs()
+                    .max_element()
+                    < 1e-6
+            );
+            for normal in [Vec3::Z, -Vec3::Z, Vec3::ZERO] {
+                // One normal differs by a hair, so that they are interpolated.
+                let mut mesh = ground(2.0, 2);
+                mesh.normals = vec![normal; mesh.positions.len()];
+                mesh.normals[4] *= 1.000_001;
+                let scene = scene_of(mesh, material());
+                let picture = render_map(&scene, &map_of(&scene, camera), &settings);
+                for (found, expected) in picture.pixels.iter().zip(&expected.pixels) {
+                    for (a, b) in found.iter().zip(expected) {
+                        assert!((a - b).abs() < 1e-6, "{found:?} and not {expected:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_number_of_threads_changes_no_byte() {
+        let mut mesh = ground(2.0, 30);
+        mesh.normals = mesh
+            .positions
+            .iter()
+            .map(|p| Vec3::new(p.x as f32, p.y as f32, 2.0).normalize())
+            .collect();
+        mesh.texcoords
+            .iter_mut()
+            .for_each(|uv| *uv *= Vec2::splat(3.3));
+        let scene = textured(mesh, checker());
+        let camera = perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.5);
+        let settings = RenderSettings {
+            width: 200,
+            height: 131,
+            ..RenderSettings::default()
+        };
+        let with_threads = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.expect("a thread pool").install(|| {
+                let picture = render_map(&scene, &map_of(&scene, camera), &settings);
+                let bits = |pixel: &[f32; 4]| pixel.map(f32::to_bits);
+                picture.pixels.iter().map(bits).collect::<Vec<_>>()
+            })
+        };
+        assert!(with_threads(1) == with_threads(3));
+    }
+
+    #[test]
+    fn a_window_is_cut_from_the_picture() {
+        let scene = textured(ground(2.0, 6), checker());
+        let map = map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
+        let grid = PixelGrid::of_frame(60, 60);
+        let whole = render_window(&scene, &map, &grid, false);
+        let window = render_window(&scene, &map, &grid.window(20.0, 33.0, 25, 19), false);
+        for (index, pixel) in window.pixels.iter().enumerate() {
+            let expected = whole.pixels[(33 + index / 25) * 60 + 20 + index % 25];
+            for (a, b) in pixel.iter().zip(expected) {
+                assert!((a - b).abs() < 1e-5, "{pixel:?} and not {expected:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn materials_that_are_drawn_as_they_are_not_are_named() {
+        let material = Material {
+            alpha_mode: AlphaMode::Mask(0.5),
+            ..Material::default()
+        };
+        let scene = scene_of(ground(2.0, 2), material);
+        let map = map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
+        let found = shortcomings(&scene, &map);
+        assert_eq!(found, [Shortcoming::DrawnOpaque(MaterialId(0))]);
+        let opaque = scene_of(ground(2.0, 2), Material::default());
+        assert_eq!(shortcomings(&opaque, &map), []);
+    }
+}

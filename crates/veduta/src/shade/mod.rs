@@ -1,0 +1,190 @@
+//! Shading: pixel parts -> radiance.
+//!
+//! Each part gets the radiance of its face at its centroid, so that a pixel with an edge in it mixes
+//! two right colours; pixels that one face fills are evaluated at their centres. Colours are linear
+//! Rec.709.
+//!
+//! 1. [`Surfaces`] looks once at each seen face. Most have one colour all over (no texture, no
+//!    interpolated normal): it is worked out here, and their parts cost a look-up. The others are made
+//!    ready for evaluation anywhere ([`surface`]).
+//! 2. Pyramids of the pictures in use are made ([`texture`]).
+//! 3. [`Surfaces::shade`] evaluates the parts of a band.
+//!
+//! The light is a stand-in, a sun and a plain sky ([`light`]), until scenes bring theirs. Opacity is
+//! not looked at: all that is diced is opaque.
+
+pub mod light;
+mod surface;
+mod texture;
+
+use crate::dice::{Parts, PixelGrid};
+use crate::scene::{ImageId, Material, Scene};
+use light::Daylight;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use surface::{Surface, SurfacePoint, Varying, Viewer};
+use texture::Pyramid;
+use veduta_geometry::{DVec2, Vec3};
+use veduta_map::{FaceId, VisibilityMap};
+
+/// Radiance of the parts of a band: linear RGB.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Radiance {
+    /// Of each of [`Parts::boundary`].
+    pub boundary: Vec<[f32; 3]>,
+    /// Of [`Parts::runs`], one after the other.
+    runs: Vec<[f32; 3]>,
+    /// Where in `runs` each run's end.
+    run_end: Vec<usize>,
+}
+
+impl Radiance {
+    /// Radiance of a run: a single value for all its pixels, or one for each.
+    pub fn of_run(&self, run: usize) -> &[[f32; 3]] {
+        let start = run
+            .checked_sub(1)
+            .map_or(0, |previous| self.run_end[previous]);
+        &self.runs[start..self.run_end[run]]
+    }
+
+    fn clear(&mut self) {
+        self.boundary.clear();
+        self.runs.clear();
+        self.run_end.clear();
+    }
+}
+
+/// The seen faces of a map, made ready for shading.
+pub struct Surfaces<'a> {
+    scene: &'a Scene,
+    light: Daylight,
+    unlit: bool,
+    /// Of each opaque fragment.
+    surfaces: Vec<Surface>,
+    varying: Vec<Varying>,
+    /// By image, for those in use.
+    pyramids: Vec<Option<Pyramid<'a>>>,
+}
+
+impl<'a> Surfaces<'a> {
+    /// Looks at the faces that are seen in `map`, a map of `scene`. With `unlit`, materials show their
+    /// colour as it is.
+    pub fn new(scene: &'a Scene, map: &VisibilityMap, light: Daylight, unlit: bool) -> Self {
+        let viewer = Viewer::new(scene, map, &light, unlit);
+        let mut surfaces: Vec<Surface> = (0..map.opaque.len())
+            .into_par_iter()
+            .with_min_len(256)
+            .map(
+                |fragment| match viewer.constant(map.opaque.face(fragment)) {
+                    Some(radiance) => Surface::Constant(radiance),
+                    None => Surface::Varying(0),
+                },
+            )
+            .collect();
+
+        // Fragments ascend by face: a face that is seen in pieces gets one row.
+        let mut faces: Vec<FaceId> = Vec::new();
+        for (fragment, surface) in surfaces.iter_mut().enumerate() {
+            if let Surface::Varying(row) = surface {
+                let face = map.opaque.face(fragment);
+                if faces.last() != Some(&face) {
+                    faces.push(face);
+                }
+                *row = faces.len() as u32 - 1;
+            }
+        }
+        let varying: Vec<Varying> = faces.par_iter().map(|&face| viewer.varying(face)).collect();
+        let images: BTreeSet<ImageId> = varying
+            .iter()
+            .filter_map(|face| scene.material(face.material).base_color_texture)
+            .map(|texture| texture.image)
+            .collect();
+        let pyramids = (0..scene.images.len())
+            .into_par_iter()
+            .map(|index| {
+                images
+                    .contains(&ImageId(index as u32))
+                    .then(|| Pyramid::new(&scene.images[index]))
+            })
+            .collect();
+        Self {
+            scene,
+            light,
+            unlit,
+            surfaces,
+            varying,
+            pyramids,
+        }
+    }
+
+    /// Whether radiance differs from point to point of a fragment.
+    #[inline(always)]
+    pub fn varies(&self, fragment: u32) -> bool {
+        matches!(self.surfaces[fragment as usize], Surface::Varying(_))
+    }
+
+    /// Radiance of `parts`, of the band of `grid` that starts at row `first_row`. `radiance` is
+    /// overwritten.
+    pub fn shade(&self, parts: &Parts, grid: &PixelGrid, first_row: u32, radiance: &mut Radiance) {
+        radiance.clear();
+        let corner = |pixel: u32| {
+            let row = first_row + pixel / grid.width;
+            DVec2::new(f64::from(pixel % grid.width), f64::from(row))
+        };
+        radiance.boundary.extend(parts.boundary.iter().map(|part| {
+            match self.surfaces[part.fragment as usize] {
+                Surface::Constant(radiance) => radiance,
+                Surface::Varying(row) => {
+                    let place = corner(part.pixel) + part.centroid.as_dvec2();
+                    self.radiance(&self.varying[row as usize], grid, place)
+                }
+            }
+        }));
+        for run in &parts.runs {
+            match self.surfaces[run.fragment as usize] {
+                Surface::Constant(value) => radiance.runs.push(value),
+                Surface::Varying(row) => {
+                    let face = &self.varying[row as usize];
+                    let first = corner(run.pixel) + 0.5;
+                    radiance.runs.extend((0..run.length).map(|step| {
+                        self.radiance(face, grid, first + DVec2::new(f64::from(step), 0.0))
+                    }));
+                }
+            }
+            radiance.run_end.push(radiance.runs.len());
+        }
+    }
+
+    /// Radiance of a face at a place of the grid.
+    fn radiance(&self, face: &Varying, grid: &PixelGrid, place: DVec2) -> [f32; 3] {
+        let material = self.scene.material(face.material);
+        let point = face.at(grid.image_from_pixels(place));
+        let color = self.color(material, &point, grid);
+        let radiance = if self.unlit || material.unlit {
+            color
+        } else {
+            color * self.light.on(point.normal) + Vec3::from(material.emissive)
+        };
+        radiance.into()
+    }
+
+    /// The material's colour at a point: its own, times the texture's, times the vertices'.
+    fn color(&self, material: &Material, point: &SurfacePoint, grid: &PixelGrid) -> Vec3 {
+        let [r, g, b, _] = material.base_color;
+        let color = Vec3::new(r, g, b) * point.color;
+        let (Some(texture), Some(place)) = (material.base_color_texture, point.picture) else {
+            return color;
+        };
+        let pyramid = self.pyramids[texture.image.0 as usize]
+            .as_ref()
+            .expect("pyramids of all pictures in use are made");
+        let pixel = grid.pixels_per_frame;
+        let texel = pyramid.sample(
+            place.at,
+            place.along_x / pixel.x,
+            place.along_y / pixel.y,
+            texture.wrap,
+        );
+        color * texel.truncate()
+    }
+}

@@ -1,0 +1,269 @@
+//! What a face looks like from the eye, made ready for evaluation at any point of it.
+
+use crate::scene::{Material, Scene};
+use crate::shade::light::Daylight;
+use crate::shade::texture::picture_from_uv;
+use veduta_geometry::{DMat3, DMat4, DVec2, DVec3, Vec3};
+use veduta_map::{Affine, Camera, FaceId, MaterialId, ObjectId, Projection, VisibilityMap};
+
+/// How the radiance of a face goes over it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Surface {
+    /// It is the same everywhere.
+    Constant([f32; 3]),
+    /// It differs from point to point: row of the table of [`Varying`].
+    Varying(u32),
+}
+
+/// A face whose radiance differs from point to point.
+#[derive(Clone, Debug)]
+pub struct Varying {
+    pub material: MaterialId,
+    corners: Corners,
+    /// Turned to the eye's side of the face.
+    face_normal: Vec3,
+    /// At the corners, in world space; not normalised.
+    normals: Option<[Vec3; 3]>,
+    /// Picture coordinates at the corners.
+    picture: Option<[DVec2; 3]>,
+    colors: Option<[Vec3; 3]>,
+}
+
+/// A point of a face as shading sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Unit normal in world space, on the eye's side.
+    pub normal: Vec3,
+    /// Factor of the material's colour.
+    pub color: Vec3,
+    /// Place in the texture, if there is one.
+    pub picture: Option<PicturePoint>,
+}
+
+/// A place in a texture and the footprint of a pixel there.
+#[derive(Clone, Copy, Debug)]
+pub struct PicturePoint {
+    /// Picture coordinates.
+    pub at: DVec2,
+    /// Change of `at` per unit of image x.
+    pub along_x: DVec2,
+    /// Change of `at` per unit of image y.
+    pub along_y: DVec2,
+}
+
+/// Barycentric coordinates of a triangle, as functions of the image plane, up to a common factor.
+///
+/// In perspective a point on the ray with direction d, z = 1, is `z d = Σ w_i V_i`, so that
+/// `w / z = [V0 V1 V2]⁻¹ d`: these are affine in the image plane, since d is, and their sum is 1/z.
+/// In parallel projection the coordinates themselves are affine. That holds for corners behind
+/// the eye, too, so a face that the near plane cut needs no other corners.
+#[derive(Clone, Copy, Debug)]
+struct Corners([Affine; 3]);
+
+impl Corners {
+    fn new(camera: &Camera, corners: [DVec3; 3]) -> Self {
+        let scale = camera.image_scale();
+        let [v0, v1, v2] = corners;
+        // Each row c is a function c · (X, Y, 1) with X = (x - 1/2) / scale.x, Y likewise.
+        let (rows, whole) = match camera.projection {
+            Projection::Perspective { .. } => {
+                let rows = [v1.cross(v2), v2.cross(v0), v0.cross(v1)];
+                (rows, v0.dot(rows[0]))
+            }
+            Projection::Parallel { .. } => {
+                let flat = corners.map(|v| DVec3::new(v.x, v.y, 1.0));
+                let [f0, f1, f2] = flat;
+                let rows = [f1.cross(f2), f2.cross(f0), f0.cross(f1)];
+                (rows, f0.dot(rows[0]))
+            }
+        };
+        Self(rows.map(|row| {
+            let (a, b) = (row.x / scale.x / whole, row.y / scale.y / whole);
+            Affine::new(a, b, row.z / whole - 0.5 * (a + b))
+        }))
+    }
+
+    /// Barycentric coordinates at an image point, and their sum's inverse (the depth).
+    ///
+    /// Rounding may put a point of a sliver outside it, and far away along it; such a point is
+    /// moved to the triangle. A triangle seen edge-on, of which nothing should be seen, gives its
+    /// middle.
+    #[inline]
+    fn at(&self, image: DVec2) -> ([f64; 3], f64) {
+        let weights = self.0.map(|weight| weight.at(image).max(0.0));
+        let sum: f64 = weights.iter().sum();
+        if sum > 0.0 && sum.is_finite() {
+            (weights.map(|weight| weight / sum), 1.0 / sum)
+        } else {
+            ([1.0 / 3.0; 3], 0.0)
+        }
+    }
+}
+
+/// The frame of mind in which faces are looked at: matrices of all objects.
+pub struct Viewer<'a> {
+    scene: &'a Scene,
+    map: &'a VisibilityMap,
+    light: &'a Daylight,
+    unlit: bool,
+    world_from_eye: DMat3,
+    objects: Vec<ObjectView>,
+}
+
+struct ObjectView {
+    eye_from_object: DMat4,
+    /// Inverse transpose: keeps normals at right angles under unequal scale.
+    world_normal_from_object: DMat3,
+}
+
+impl<'a> Viewer<'a> {
+    pub fn new(scene: &'a Scene, map: &'a VisibilityMap, light: &'a Daylight, unlit: bool) -> Self {
+        let eye_from_world = map.camera.eye_from_world;
+        let view = |object: &crate::scene::Object| ObjectView {
+            eye_from_object: eye_from_world * object.world_from_object,
+            world_normal_from_object: DMat3::from_mat4(object.world_from_object)
+                .inverse()
+                .transpose(),
+        };
+        Self {
+            scene,
+            map,
+            light,
+            unlit,
+            world_from_eye: DMat3::from_mat4(eye_from_world).transpose(),
+            objects: scene.objects.iter().map(view).collect(),
+        }
+    }
+
+    fn lit(&self, material: &Material) -> bool {
+        !(self.unlit || material.unlit)
+    }
+
+    /// The face's radiance if it is the same everywhere.
+    pub fn constant(&self, face: FaceId) -> Option<[f32; 3]> {
+        let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
+        let mesh = self.scene.mesh_of(object);
+        let material = self.scene.material_of(object, source);
+        if material.base_color_texture.is_some() && !mesh.texcoords.is_empty() {
+            return None;
+        }
+        let corners = mesh.triangles[source as usize].map(|corner| corner as usize);
+        let [r, g, b, _] = material.base_color;
+        let mut color = Vec3::new(r, g, b);
+        if !mesh.colors.is_empty() {
+            color *= Vec3::from(all_equal(corners.map(|corner| mesh.colors[corner]))?);
+        }
+        if !self.lit(material) {
+            return Some(color.into());
+        }
+        let face_normal = self.face_normal(&self.eye_corners(object, source));
+        let normal = if mesh.normals.is_empty() {
+            face_normal
+        } else {
+            let normal = all_equal(corners.map(|corner| mesh.normals[corner]))?;
+            let turned = self.objects[object.index()].world_normal_from_object * normal.as_dvec3();
+            on_side_of(turned.as_vec3(), face_normal)
+        };
+        let radiance = color * self.light.on(normal) + Vec3::from(material.emissive);
+        Some(radiance.into())
+    }
+
+    /// The face made ready for evaluation from point to point.
+    pub fn varying(&self, face: FaceId) -> Varying {
+        let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
+        let mesh = self.scene.mesh_of(object);
+        let material = mesh.material_of(source);
+        let texture = self.scene.material(material).base_color_texture;
+        let corners = mesh.triangles[source as usize].map(|corner| corner as usize);
+        let eye_corners = self.eye_corners(object, source);
+        let turn = &self.objects[object.index()].world_normal_from_object;
+        let has = |rows: usize| (rows > 0).then_some(corners);
+        Varying {
+            material,
+            corners: Corners::new(&self.map.camera, eye_corners),
+            face_normal: self.face_normal(&eye_corners),
+            normals: has(mesh.normals.len()).map(|corners| {
+                // Normalised here: an object scaled unequally would weigh its corners otherwise.
+                corners.map(|corner| {
+                    (*turn * mesh.normals[corner].as_dvec3())
+                        .normalize_or_zero()
+                        .as_vec3()
+                })
+            }),
+            picture: texture
+                .zip(has(mesh.texcoords.len()))
+                .map(|(texture, corners)| {
+                    corners.map(|corner| picture_from_uv(&texture, mesh.texcoords[corner]))
+                }),
+            colors: has(mesh.colors.len())
+                .map(|corners| corners.map(|corner| Vec3::from(mesh.colors[corner]))),
+        }
+    }
+
+    fn eye_corners(&self, object: ObjectId, source: u32) -> [DVec3; 3] {
+        let mesh = self.scene.mesh_of(object);
+        let eye_from_object = &self.objects[object.index()].eye_from_object;
+        mesh.triangles[source as usize]
+            .map(|corner| eye_from_object.transform_point3(mesh.positions[corner as usize]))
+    }
+
+    /// Unit normal of a face in world space, on the eye's side.
+    fn face_normal(&self, corners: &[DVec3; 3]) -> Vec3 {
+        let [v0, v1, v2] = *corners;
+        let normal = (v1 - v0).cross(v2 - v0).normalize_or_zero();
+        let away = match self.map.camera.projection {
+            Projection::Perspective { .. } => normal.dot(v0) > 0.0,
+            Projection::Parallel { .. } => normal.z > 0.0,
+        };
+        let normal = self.world_from_eye * normal;
+        (if away { -normal } else { normal }).as_vec3()
+    }
+}
+
+/// The value, if all three are the same.
+fn all_equal<T: Copy + PartialEq>([a, b, c]: [T; 3]) -> Option<T> {
+    (a == b && b == c).then_some(a)
+}
+
+/// `normal` as a unit vector, turned to the side of the face that `face_normal` points to.
+///
+/// Models have normals that point inwards, or faces wound the wrong way; this makes both look right,
+/// and the back of a face too. Where the normal is missing (zero) the face's is taken.
+#[inline]
+fn on_side_of(normal: Vec3, face_normal: Vec3) -> Vec3 {
+    let normal = if normal.dot(face_normal) < 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    normal.try_normalize().unwrap_or(face_normal)
+}
+
+impl Varying {
+    /// The face at an image point.
+    #[inline]
+    pub fn at(&self, image: DVec2) -> SurfacePoint {
+        let ([w0, w1, w2], depth) = self.corners.at(image);
+        let mean = |[a, b, c]: [Vec3; 3]| a * w0 as f32 + b * w1 as f32 + c * w2 as f32;
+        SurfacePoint {
+            normal: match self.normals {
+                Some(normals) => on_side_of(mean(normals), self.face_normal),
+                None => self.face_normal,
+            },
+            color: self.colors.map_or(Vec3::ONE, mean),
+            picture: self.picture.map(|[p, q, r]| {
+                let at = p * w0 + q * w1 + r * w2;
+                // Quotient rule: at = Σ p_i b_i / Σ b_i, with affine b_i.
+                let [b0, b1, b2] = self.corners.0;
+                let along = |d0: f64, d1: f64, d2: f64| {
+                    ((p - at) * d0 + (q - at) * d1 + (r - at) * d2) * depth
+                };
+                PicturePoint {
+                    at,
+                    along_x: along(b0.a, b1.a, b2.a),
+                    along_y: along(b0.b, b1.b, b2.b),
+                }
+            }),
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Which faces may be seen, and in which cells they may hide others.
+
+use super::clip::Context;
+use super::grid::Extent;
+use super::guess::OPEN;
+use rayon::prelude::*;
+use veduta_map::FaceId;
+use wide::f32x8;
+
+/// How many faces are compared at once.
+pub(super) const LANES: usize = 8;
+
+/// The faces that are not guessed to be hidden in a cell, for every cell.
+///
+/// Columns in cell order, so that a cell's extents are read as a stream; the bounds that `overlaps`
+/// compares are stored, and no more. Veils hide nothing and are not listed.
+pub(super) struct CellLists {
+    start: Vec<u32>,
+    face: Vec<u32>,
+    left: Vec<f32>,
+    right: Vec<f32>,
+    top: Vec<f32>,
+    bottom: Vec<f32>,
+    nearest: Vec<f32>,
+    /// Whether a face was guessed to be hidden in the cell.
+    guessed: Vec<bool>,
+}
+
+/// Faces a task looks at at a time.
+const FACES_PER_TASK: usize = 8192;
+
+/// A nearness this much below a threshold, relative to its size, still counts as reaching it, so
+/// that rounding never hides a face that `verify` would have found seen.
+const THRESHOLD_MARGIN: f64 = 1e-6;
+
+/// Whether a face that is at most `nearness` near in a cell may be seen there.
+#[inline]
+fn reaches(nearness: f64, threshold: f32) -> bool {
+    let threshold = f64::from(threshold);
+    nearness >= threshold - threshold.abs() * THRESHOLD_MARGIN || threshold == f64::from(OPEN)
+}
+
+/// The faces that may be seen somewhere, ascending, and where.
+///
+/// With thresholds `before`, only what those left out and `thresholds` let in.
+pub(super) fn listed_between(
+    context: &Context,
+    before: Option<&[f32]>,
+    thresholds: &[f32],
+) -> (Vec<FaceId>, CellLists) {
+    let count = context.faces.len();
+    let chunks: Vec<Chunk> = (0..count.div_ceil(FACES_PER_TASK))
+        .into_par_iter()
+        .map(|chunk| {
+            let start = chunk * FACES_PER_TASK;
+            let end = (start + FACES_PER_TASK).min(count);
+            Chunk::list(context, before, thresholds, start..end)
+        })
+        .collect();
+    let cells = context.grid.cells();
+    let mut guessed = vec![false; cells];
+    for &cell in chunks.iter().flat_map(|chunk| &chunk.guessed) {
+        guessed[cell as usize] = true;
+    }
+    let lists = CellLists::gather(cells, &chunks, context.extents, guessed);
+    let faces = chunks
+        .iter()
+        .flat_map(|chunk| &chunk.faces)
+        .copied()
+        .collect();
+    (faces, lists)
+}
+
+/// What one task lists.
+struct Chunk {
+    faces: Vec<FaceId>,
+    /// `(cell, face)`, by face.
+    listed: Vec<(u32, u32)>,
+    /// Cells in which a face was guessed to be hidden.
+    guessed: Vec<u32>,
+}
+
+impl Chunk {
+    fn list(
+        context: &Context,
+        before: Option<&[f32]>,
+        thresholds: &[f32],
+        range: std::ops::Range<usize>,
+    ) -> Self {
+        let Context {
+            faces,
+            extents,
+            grid,
+        } = *context;
+        let mut chunk = Self {
+            faces: Vec::new(),
+            listed: Vec::new(),
+            guessed: Vec::new(),
+        };
+        for index in range {
+            let face = FaceId(index as u32);
+            let extent = &extents[index];
+            let nearest = f64::from(extent.nearness[1]);
+            let plane = faces.face_nearness(face);
+            let is_veil = faces.is_veil(face);
+            let mut admitted = false;
+            grid.each_row(faces.outline(face), extent, |row, columns| {
+                for column in columns {
+                    let cell = grid.index(column, row);
+                    if before.is_some_and(|before| before[cell] == thresholds[cell]) {
+                        continue;
+                    }
+                    let reaches = |threshold: f32| {
+                        reaches(nearest, threshold)
+                            && reaches(grid.upper_bound(plane, column, row), threshold)
+                    };
+                    if !reaches(thresholds[cell]) {
+                        if chunk.guessed.last() != Some(&(cell as u32)) {
+                            chunk.guessed.push(cell as u32);
+                        }
+                    } else if !before.is_some_and(|before| reaches(before[cell])) {
+                        admitted = true;
+                        if !is_veil {
+                            chunk.listed.push((cell as u32, index as u32));
+                        }
+                    }
+                }
+                true
+            });
+            if admitted {
+                chunk.faces.push(face);
+            }
+        }
+        chunk
+    }
+}
+
+impl CellLists {
+    fn gather(cells: usize, chunks: &[Chunk], extents: &[Extent], guessed: Vec<bool>) -> Self {
+        // A counting sort by cell; within a cell faces stay in order.
+        let mut start = vec![0_u32; cells + 1];
+        for &(cell, _) in chunks.iter().flat_map(|chunk| &chunk.listed) {
+            start[cell as usize + 1] += 1;
+        }
+        for cell in 0..cells {
+            start[cell + 1] += start[cell];
+        }
+        let entries = start[cells] as usize;
+        let mut face = vec![0_u32; entries];
+        let mut next = start.clone();
+        for &(cell, id) in chunks.iter().flat_map(|chunk| &chunk.listed) {
+            let place = &mut next[cell as usize];
+            face[*place as usize] = id;
+            *place += 1;
+        }
+        // Padded, so that the last cell too can be read LANES at a time.
+        let column = |bound: fn(&Extent) -> f32| -> Vec<f32> {
+            let mut column: Vec<f32> = Vec::with_capacity(entries + LANES);
+            face.par_iter()
+                .with_min_len(16 * 1024)
+                .map(|&id| bound(&extents[id as usize]))
+                .collect_into_vec(&mut column);
+            column.resize(entries + LANES, 0.0);
+            column
+        };
+        Self {
+            left: column(|extent| extent.x[0]),
+            right: column(|extent| extent.x[1]),
+            top: column(|extent| extent.y[0]),
+            bottom: column(|extent| extent.y[1]),
+            nearest: column(|extent| extent.nearness[1]),
+            start,
+            face,
+            guessed,
+        }
+    }
+
+    /// Whether a face was guessed to be hidden in the cell.
+    pub fn guessed(&self, cell: usize) -> bool {
+        self.guessed[cell]
+    }
+
+    /// Calls `visit` with the faces of a cell whose box overlaps that of `extent` and which are, at
+    /// their nearest, nearer than it is at its farthest. `visit` returns whether to go on.
+    #[inline]
+    pub fn overlapping(
+        &self,
+        cell: usize,
+        extent: &Extent,
+        mut visit: impl FnMut(FaceId) -> bool,
+    ) -> bool {
+        let load = |column: &[f32], at: usize| {
+            let lanes: [f32; LANES] = column[at..at + LANES]
+                .try_into()
+                .expect("a slice of this length");
+            f32x8::from(lanes)
+        };
+        let [left, right] = extent.x.map(f32x8::splat);
+        let [top, bottom] = extent.y.map(f32x8::splat);
+        let farthest = f32x8::splat(extent.nearness[0]);
+        let (start, end) = (self.start[cell] as usize, self.start[cell + 1] as usize);
+        for at in (start..end).step_by(LANES) {
+            let overlaps = load(&self.left, at).simd_lt(right)
+                & load(&self.right, at).simd_gt(left)
+                & load(&self.top, at).simd_lt(bottom)
+                & load(&self.bottom, at).simd_gt(top)
+                & load(&self.nearest, at).simd_ge(farthest);
+            let in_cell = (1_u32 << (end - at).min(LANES)) - 1;
+            let mut mask = overlaps.to_bitmask() & in_cell;
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize;
+                mask &= mask - 1;
+                if !visit(FaceId(self.face[at + lane])) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,196 @@
+//! The exact clip: each candidate less the nearer parts of the candidates that overlap it.
+//!
+//! No face depends on another's result, so the order in which they are taken changes nothing.
+
+use super::cells::CellLists;
+use super::found::Pile;
+use super::grid::{Extent, Grid};
+use super::pieces::{Corner, Depth, Pieces, crossing_tolerance};
+use super::sides::{Sides, later_sides_separate};
+use veduta_geometry::{Affine, DVec2};
+use veduta_map::{FaceId, Faces};
+
+/// What all clips share.
+#[derive(Clone, Copy)]
+pub(super) struct Context<'a> {
+    pub faces: &'a Faces,
+    pub extents: &'a [Extent],
+    pub grid: &'a Grid,
+}
+
+/// Clips one face after the other; holds what is reused between them.
+pub(super) struct Clipper<'a> {
+    context: Context<'a>,
+    pub pieces: Pieces,
+    /// Whether a face in the same plane hid something of this one.
+    tied: bool,
+    /// For each face, the last face it was compared with: a pair may meet in several cells.
+    ///
+    /// Ids are kept plus one: memory that is zero from the start costs nothing until it is used.
+    compared_with: Vec<u32>,
+}
+
+impl<'a> Clipper<'a> {
+    pub fn new(context: Context<'a>) -> Self {
+        let compared_with = vec![0; context.faces.len()];
+        Self {
+            context,
+            pieces: Pieces::default(),
+            tied: false,
+            compared_with,
+        }
+    }
+
+    /// Leaves in `self.pieces` what is seen of `face` among the faces of `lists`.
+    pub fn clip(&mut self, face: FaceId, lists: &[&CellLists]) {
+        self.pieces.start(face, self.context.faces.outline(face));
+        self.tied = false;
+        self.subtract_listed(face, lists, |_| true);
+    }
+
+    /// Makes `self.pieces` the fragments of `face` found before; one without corners is all of it.
+    pub fn resume<'f>(&mut self, face: FaceId, fragments: impl Iterator<Item = &'f [Corner]>) {
+        self.tied = false;
+        self.pieces.clear();
+        for corners in fragments {
+            if corners.is_empty() {
+                self.pieces.start(face, self.context.faces.outline(face));
+            } else {
+                self.pieces.add(corners);
+            }
+        }
+    }
+
+    /// Adds to `pile` what is left of `face`.
+    pub fn store(&self, face: FaceId, pile: &mut Pile) {
+        pile.push(face, &self.pieces);
+        pile.pierced += usize::from(self.pieces.crossed());
+        pile.tied += usize::from(self.tied);
+    }
+
+    /// Takes from `self.pieces`, which are of `face`, what the faces listed in its cells hide;
+    /// only in cells for which `wanted` holds.
+    pub fn subtract_listed(
+        &mut self,
+        face: FaceId,
+        lists: &[&CellLists],
+        wanted: impl Fn(usize) -> bool,
+    ) {
+        let Self {
+            context,
+            pieces,
+            tied,
+            compared_with,
+        } = self;
+        let Context {
+            faces,
+            extents,
+            grid,
+        } = *context;
+        let outline = faces.outline(face);
+        let extent = &extents[face.index()];
+        let occludee = Occludee::new(faces, face);
+        let stamp = face.0 + 1;
+        compared_with[face.index()] = stamp;
+        grid.each_row(outline, extent, |row, columns| {
+            for column in columns {
+                let cell = grid.index(column, row);
+                if !wanted(cell) {
+                    continue;
+                }
+                for list in lists {
+                    list.overlapping(cell, extent, |occluder| {
+                        if compared_with[occluder.index()] == stamp {
+                            return true;
+                        }
+                        compared_with[occluder.index()] = stamp;
+                        if let Some((depth, sides)) = occludee.occlusion(occluder) {
+                            let losses = pieces.losses();
+                            pieces.subtract(occluder, faces.outline(occluder), &sides, depth);
+                            *tied |= pieces.losses() != losses
+                                && faces.plane(occluder) == faces.plane(face);
+                        }
+                        !pieces.is_empty()
+                    });
+                    if pieces.is_empty() {
+                        return false;
+                    }
+                }
+            }
+            true
+        });
+    }
+}
+
+/// A face that may be hidden, made ready to be compared with many others.
+struct Occludee<'a> {
+    face: FaceId,
+    faces: &'a Faces,
+    outline: &'a [DVec2],
+    plane: &'a Affine,
+    sides: Sides,
+}
+
+impl<'a> Occludee<'a> {
+    fn new(faces: &'a Faces, face: FaceId) -> Self {
+        let outline = faces.outline(face);
+        let plane = faces.face_nearness(face);
+        Self {
+            face,
+            faces,
+            outline,
+            plane,
+            sides: Sides::group(outline, 0),
+        }
+    }
+
+    /// How `occluder` lies to this face, and its sides; `None` where it hides nothing: it is behind,
+    /// or their projections do not overlap.
+    #[inline]
+    fn occlusion(&self, occluder: FaceId) -> Option<(Depth, Sides)> {
+        let other = self.faces.outline(occluder);
+        if self.sides.separate(other) {
+            return None;
+        }
+        let depth = self.order(occluder, other);
+        if depth == Depth::Behind {
+            return None;
+        }
+        let sides = Sides::group(other, 0);
+        let apart = sides.separate(self.outline)
+            || later_sides_separate(self.outline, other)
+            || later_sides_separate(other, self.outline);
+        (!apart).then_some((depth, sides))
+    }
+
+    /// Which of the two is in front. Both sides of a pair come to the same answer: a difference of
+    /// planes is exactly antisymmetric.
+    #[inline]
+    fn order(&self, occluder: FaceId, other: &[DVec2]) -> Depth {
+        let by_key = if occluder < self.face {
+            Depth::InFront
+        } else {
+            Depth::Behind
+        };
+        if self.faces.plane(self.face) == self.faces.plane(occluder) {
+            return by_key;
+        }
+        let difference = self.faces.face_nearness(occluder).minus(self.plane);
+        let tolerance = crossing_tolerance(&difference);
+        for outline in [self.outline, other] {
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for &point in outline {
+                let value = difference.at(point);
+                low = low.min(value);
+                high = high.max(value);
+            }
+            match (low >= -tolerance, high <= tolerance) {
+                (true, true) => return by_key,
+                (true, false) => return Depth::InFront,
+                (false, true) => return Depth::Behind,
+                (false, false) => {}
+            }
+        }
+        Depth::Crossing(difference)
+    }
+}

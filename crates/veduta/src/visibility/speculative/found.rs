@@ -1,0 +1,146 @@
+//! What has been found seen so far, until it is put in order.
+//!
+//! Faces are clipped in the order of their place in the frame, so that those which are compared lie
+//! together in memory; and mending replaces what was found of a face. Both are easy while fragments
+//! lie in piles and an entry for each face tells where. [`Found::into_seen`] sorts once, at the end.
+
+use super::pieces::{Corner, Pieces};
+use crate::visibility::Seen;
+use rayon::prelude::*;
+use veduta_geometry::DVec2;
+use veduta_map::{FaceId, Faces, Fragments};
+
+/// Fragments of one task, in the order in which it found them.
+#[derive(Default)]
+pub(super) struct Pile {
+    /// `corners[start[i]..start[i + 1]]` are fragment `i`; none if the face is seen whole.
+    start: Vec<u32>,
+    corners: Vec<Corner>,
+    /// Which of them are of which face; `pile` is set when the pile is added to [`Found`].
+    entries: Vec<Entry>,
+    /// Faces cut by a crossing of planes.
+    pub pierced: usize,
+    /// Faces of which a face in the same plane hid something.
+    pub tied: usize,
+}
+
+/// Where the fragments of a face are.
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub face: FaceId,
+    pile: u32,
+    first: u32,
+    count: u32,
+}
+
+/// All piles, and an entry for each face that is seen.
+#[derive(Default)]
+pub(super) struct Found {
+    piles: Vec<Pile>,
+    pub entries: Vec<Entry>,
+}
+
+impl Pile {
+    /// Adds what is left of a face; nothing if that is nothing.
+    pub fn push(&mut self, face: FaceId, pieces: &Pieces) {
+        let first = self.start.len() as u32;
+        if pieces.touched() {
+            for piece in pieces.iter() {
+                self.start.push(self.corners.len() as u32);
+                self.corners.extend_from_slice(piece);
+            }
+        } else {
+            self.start.push(self.corners.len() as u32);
+        }
+        let count = self.start.len() as u32 - first;
+        if count > 0 {
+            self.entries.push(Entry {
+                face,
+                pile: u32::MAX,
+                first,
+                count,
+            });
+        }
+    }
+
+    fn fragment(&self, index: u32) -> &[Corner] {
+        let start = self.start[index as usize] as usize;
+        let end = self
+            .start
+            .get(index as usize + 1)
+            .map_or(self.corners.len(), |&end| end as usize);
+        &self.corners[start..end]
+    }
+}
+
+impl Found {
+    /// Adds a task's pile, and an entry for each of its faces.
+    pub fn add(&mut self, mut pile: Pile) {
+        let index = self.piles.len() as u32;
+        let entries = std::mem::take(&mut pile.entries);
+        self.entries.extend(entries.iter().map(|&entry| Entry {
+            pile: index,
+            ..entry
+        }));
+        self.piles.push(pile);
+    }
+
+    /// The fragments of an entry; one without corners is the whole face.
+    pub fn fragments(&self, entry: Entry) -> impl Iterator<Item = &[Corner]> {
+        let pile = &self.piles[entry.pile as usize];
+        (entry.first..entry.first + entry.count).map(|index| pile.fragment(index))
+    }
+
+    /// The polygons of an entry.
+    pub fn polygons<'a>(
+        &'a self,
+        faces: &'a Faces,
+        entry: Entry,
+    ) -> impl Iterator<Item = impl Iterator<Item = DVec2> + 'a> {
+        self.fragments(entry).map(move |corners| {
+            let whole = if corners.is_empty() {
+                faces.outline(entry.face)
+            } else {
+                &[]
+            };
+            whole
+                .iter()
+                .copied()
+                .chain(corners.iter().map(|corner| corner.point))
+        })
+    }
+
+    /// The fragments by face.
+    pub fn into_seen(mut self, faces: &Faces) -> Seen {
+        self.entries.par_sort_unstable_by_key(|entry| entry.face);
+        let parts: Vec<Seen> = self
+            .entries
+            .par_chunks(16 * 1024)
+            .map(|entries| {
+                let mut seen = Seen::default();
+                for &entry in entries {
+                    let fragments: &mut Fragments = if faces.is_veil(entry.face) {
+                        &mut seen.veils
+                    } else {
+                        &mut seen.opaque
+                    };
+                    for corners in self.fragments(entry) {
+                        if corners.is_empty() {
+                            fragments.push_whole(entry.face);
+                        } else {
+                            let corners = corners.iter().map(|corner| (corner.point, corner.side));
+                            fragments.push_cut(entry.face, corners);
+                        }
+                    }
+                }
+                seen
+            })
+            .collect();
+        let opaque: Vec<&Fragments> = parts.iter().map(|part| &part.opaque).collect();
+        let veils: Vec<&Fragments> = parts.iter().map(|part| &part.veils).collect();
+        Seen {
+            opaque: Fragments::concat(&opaque),
+            veils: Fragments::concat(&veils),
+        }
+    }
+}

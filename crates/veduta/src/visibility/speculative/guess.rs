@@ -1,0 +1,166 @@
+//! The guess: how near the nearest surface is in each cell, seen through a coarse z-buffer.
+//!
+//! A face whose greatest nearness in a cell is below the cell's threshold is *guessed* to be hidden
+//! there. The samples may miss a gap, so the guess may be wrong; `verify` finds out.
+
+use super::grid::{Extent, Grid};
+use rayon::prelude::*;
+use veduta_geometry::{Affine, DVec2};
+use veduta_map::{FaceId, Faces};
+
+/// The threshold of a cell in which nothing is guessed to be hidden.
+pub(super) const OPEN: f32 = f32::NEG_INFINITY;
+
+/// Share of the range of nearness around a cell that is taken off its threshold. Less would make
+/// more wrong guesses, each costing a repair; more would hide fewer faces.
+const SLACK: f32 = 0.25;
+
+/// Thresholds of all cells, from `samples` by `samples` z-buffer samples a cell.
+pub(super) fn thresholds(faces: &Faces, extents: &[Extent], grid: &Grid, samples: u32) -> Vec<f32> {
+    // Each band of cell rows has its own z-buffer. A band looks at every face's extent, so there
+    // are as many as threads; a sample holds a maximum, so the bands change nothing.
+    let bands = rayon::current_num_threads().min(grid.rows as usize) as u32;
+    let rows_of = |band: u32| band * grid.rows / bands..(band + 1) * grid.rows / bands;
+    let parts: Vec<Vec<f32>> = (0..bands)
+        .into_par_iter()
+        .map(|band| {
+            let rows = rows_of(band);
+            let first = (rows.start * samples).saturating_sub(1);
+            let last = (rows.end * samples + 1).min(grid.rows * samples);
+            let mut buffer = ZBuffer::new(grid.columns * samples, grid.rows * samples, first..last);
+            for (index, extent) in extents.iter().enumerate() {
+                let face = FaceId(index as u32);
+                if buffer.reaches(extent) && !faces.is_veil(face) {
+                    buffer.draw(faces.outline(face), faces.face_nearness(face));
+                }
+            }
+            buffer.thresholds(rows, grid.columns, samples)
+        })
+        .collect();
+    parts.concat()
+}
+
+/// Samples of some rows of the frame, each with the greatest nearness found there.
+struct ZBuffer {
+    width: usize,
+    rows: std::ops::Range<usize>,
+    /// Size of a sample in the image plane.
+    pixel: DVec2,
+    samples: Vec<f32>,
+}
+
+impl ZBuffer {
+    fn new(width: u32, height: u32, rows: std::ops::Range<u32>) -> Self {
+        Self {
+            width: width as usize,
+            rows: rows.start as usize..rows.end as usize,
+            pixel: DVec2::new(1.0 / f64::from(width), 1.0 / f64::from(height)),
+            samples: vec![OPEN; width as usize * (rows.end - rows.start) as usize],
+        }
+    }
+
+    /// Whether a face of this extent can hold a sample of these rows.
+    #[inline]
+    fn reaches(&self, extent: &Extent) -> bool {
+        let pixel = self.pixel.y as f32;
+        let first = (extent.y[0] / pixel + 0.5) as usize;
+        let last = (extent.y[1] / pixel + 0.5) as usize;
+        first < last && first < self.rows.end && last > self.rows.start
+    }
+
+    /// Draws a convex outline as a fan of triangles.
+    fn draw(&mut self, outline: &[DVec2], plane: &Affine) {
+        let plane = Affine::new(plane.a * self.pixel.x, plane.b * self.pixel.y, plane.c);
+        let first = outline[0] / self.pixel;
+        for edge in outline[1..].windows(2) {
+            self.draw_triangle([first, edge[0] / self.pixel, edge[1] / self.pixel], &plane);
+        }
+    }
+
+    /// Draws a triangle given in samples.
+    fn draw_triangle(&mut self, mut v: [DVec2; 3], plane: &Affine) {
+        if v[1].y < v[0].y {
+            v.swap(0, 1);
+        }
+        if v[2].y < v[1].y {
+            v.swap(1, 2);
+        }
+        if v[1].y < v[0].y {
+            v.swap(0, 1);
+        }
+        // Row r holds the samples at y = r + 1/2.
+        let row_after = |y: f64| (y + 0.5) as usize;
+        let first = row_after(v[0].y).max(self.rows.start);
+        let last = row_after(v[2].y).min(self.rows.end);
+        if first >= last {
+            return;
+        }
+        let slope = |p: DVec2, q: DVec2| (q.x - p.x) / (q.y - p.y);
+        let long = slope(v[0], v[2]);
+        let short = [slope(v[0], v[1]), slope(v[1], v[2])];
+        let step = plane.a as f32;
+        for row in first..last {
+            let y = row as f64 + 0.5;
+            let x0 = v[0].x + (y - v[0].y) * long;
+            let x1 = if y < v[1].y {
+                v[0].x + (y - v[0].y) * short[0]
+            } else {
+                v[1].x + (y - v[1].y) * short[1]
+            };
+            let start = (x0.min(x1) + 0.5) as usize;
+            let end = ((x0.max(x1) + 0.5) as usize).min(self.width);
+            if start >= end {
+                continue;
+            }
+            let mut nearness = plane.at(DVec2::new(start as f64 + 0.5, y)) as f32;
+            let base = (row - self.rows.start) * self.width;
+            for sample in &mut self.samples[base + start..base + end] {
+                if nearness > *sample {
+                    *sample = nearness;
+                }
+                nearness += step;
+            }
+        }
+    }
+
+    /// Thresholds of the cells in cell rows `rows`.
+    ///
+    /// A cell looks at its own samples and at those one further on each side.
+    fn thresholds(&self, rows: std::ops::Range<u32>, columns: u32, samples: u32) -> Vec<f32> {
+        let samples = samples as usize;
+        let mut thresholds = Vec::with_capacity(rows.len() * columns as usize);
+        let mut lowest = vec![0.0_f32; self.width];
+        let mut highest = vec![0.0_f32; self.width];
+        for row in rows {
+            let first = (row as usize * samples)
+                .saturating_sub(1)
+                .max(self.rows.start);
+            let last = ((row as usize + 1) * samples + 1).min(self.rows.end);
+            lowest.fill(f32::INFINITY);
+            highest.fill(OPEN);
+            for line in first..last {
+                let base = (line - self.rows.start) * self.width;
+                let line = &self.samples[base..base + self.width];
+                for ((low, high), &sample) in lowest.iter_mut().zip(&mut highest).zip(line) {
+                    *low = low.min(sample);
+                    *high = high.max(sample);
+                }
+            }
+            for column in 0..columns as usize {
+                let start = (column * samples).saturating_sub(1);
+                let end = ((column + 1) * samples + 1).min(self.width);
+                let low = lowest[start..end]
+                    .iter()
+                    .copied()
+                    .fold(f32::INFINITY, f32::min);
+                let high = highest[start..end].iter().copied().fold(OPEN, f32::max);
+                thresholds.push(if low == OPEN {
+                    OPEN
+                } else {
+                    low - SLACK * (high - low)
+                });
+            }
+        }
+        thresholds
+    }
+}

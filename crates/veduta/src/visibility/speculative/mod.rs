@@ -1,0 +1,216 @@
+//! The main engine: guess with a z-buffer, clip exactly, verify, mend.
+//!
+//! 1. [`guess`]: a coarse z-buffer tells, for each cell of the frame, how near the nearest surface
+//!    about is. It only *guesses* what is hidden.
+//! 2. [`cells`]: faces that are not guessed to be hidden everywhere become candidates, and are
+//!    listed in the cells in which they may be seen.
+//! 3. [`clip`]: each candidate is clipped exactly by the nearer candidates that overlap it; where
+//!    planes cross, by one more line. Most seen faces are seen whole and need no cut. The cost does
+//!    not depend on any resolution.
+//! 4. [`verify`]: the guess is proved from the result: in each cell where something was guessed to
+//!    be hidden, what was found seen must leave no gap and be nearer.
+//! 5. [`mend`]: where it was wrong, the faces that it hid are admitted and taken from what
+//!    was found, there and nowhere else, until every cell is proved.
+//!
+//! Without the guess ([`Settings::guess`]) every face is a candidate everywhere and nothing needs to
+//! be proved: the same exact clip, slower. Input: projected faces. Output: fragments, the same for
+//! any number of threads.
+
+mod cells;
+mod clip;
+mod found;
+mod grid;
+mod guess;
+mod mend;
+mod pieces;
+mod sides;
+mod verify;
+
+use super::Seen;
+use cells::{CellLists, listed_between};
+use clip::{Clipper, Context};
+use found::{Found, Pile};
+use grid::{Extent, Grid};
+use rayon::prelude::*;
+use veduta_geometry::{Affine, DVec2};
+use veduta_map::{FaceId, Faces};
+use verify::{Scratch, Verification};
+
+/// How the engine works; what it finds does not depend on it, but for the cuts inside a face.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Whether hidden faces are guessed with a z-buffer first.
+    pub guess: bool,
+    /// Width over height of the frame, so that cells are about square.
+    pub aspect: f64,
+    /// Number of cells, about; by default one for each few faces.
+    pub cells: Option<u32>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            guess: true,
+            aspect: 1.5,
+            cells: None,
+        }
+    }
+}
+
+/// What the engine did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Faces that were not guessed to be hidden everywhere.
+    pub candidates: usize,
+    /// Rounds of mending.
+    pub rounds: usize,
+    /// Cells in which the guess was wrong, counted in each round.
+    pub mended_cells: usize,
+    /// Candidates cut by a crossing of planes.
+    pub pierced: usize,
+    /// Candidates of which a face in the same plane hid something.
+    pub tied: usize,
+}
+
+/// Finds where each face is seen.
+pub fn find(faces: &Faces, settings: &Settings) -> Seen {
+    find_and_report(faces, settings).0
+}
+
+/// [`find`], and what it took.
+pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
+    let extents = Extent::of_all(faces);
+    let grid = choose_grid(faces.len(), settings);
+    let context = Context {
+        faces,
+        extents: &extents,
+        grid: &grid,
+    };
+
+    let mut thresholds = if settings.guess {
+        guess::thresholds(faces, &extents, &grid, SAMPLES)
+    } else {
+        vec![guess::OPEN; grid.cells()]
+    };
+    let (candidates, lists) = listed_between(&context, None, &thresholds);
+
+    let verification = Verification::new(grid.cells());
+    let mut report = Report {
+        candidates: candidates.len(),
+        ..Report::default()
+    };
+    let mut found = Found::default();
+    let in_order = by_place(&context, &candidates);
+    clip_all(
+        &context,
+        &in_order,
+        &[&lists],
+        &mut found,
+        &mut report,
+        |scratch, piece, plane| {
+            verification.add(&context, scratch, &thresholds, piece, plane, |cell| {
+                lists.guessed(cell)
+            });
+        },
+    );
+    if settings.guess {
+        let verification = &verification;
+        mend::mend(
+            &context,
+            lists,
+            candidates,
+            &mut thresholds,
+            verification,
+            &mut found,
+            &mut report,
+        );
+    }
+    (found.into_seen(faces), report)
+}
+
+/// Samples of the guess along each side of a cell.
+const SAMPLES: u32 = 4;
+
+/// Faces for each cell, by default.
+const FACES_PER_CELL: f64 = 4.0;
+
+fn choose_grid(faces: usize, settings: &Settings) -> Grid {
+    let cells = settings.cells.map_or_else(
+        || (faces as f64 / FACES_PER_CELL).clamp(1024.0, 1024.0 * 1024.0),
+        |cells| f64::from(cells.max(1)),
+    );
+    let columns = (cells * settings.aspect).sqrt().round().clamp(1.0, 16384.0);
+    let rows = (cells / columns).round().clamp(1.0, 16384.0);
+    Grid {
+        columns: columns as u32,
+        rows: rows as u32,
+    }
+}
+
+/// Candidates clipped by a task at a time.
+const FACES_PER_TASK: usize = 512;
+
+impl Report {
+    fn count(&mut self, pile: &Pile) {
+        self.pierced += pile.pierced;
+        self.tied += pile.tied;
+    }
+}
+
+/// The candidates in the order of the cells they begin in: what is compared lies together.
+fn by_place(context: &Context, candidates: &[FaceId]) -> Vec<FaceId> {
+    let cell_of = |face: FaceId| {
+        let span = context.grid.span(&context.extents[face.index()]);
+        context.grid.index(span.columns[0], span.rows[0])
+    };
+    let mut next = vec![0_u32; context.grid.cells() + 1];
+    for &face in candidates {
+        next[cell_of(face) + 1] += 1;
+    }
+    for cell in 1..next.len() {
+        next[cell] += next[cell - 1];
+    }
+    let mut in_order = vec![FaceId(0); candidates.len()];
+    for &face in candidates {
+        let place = &mut next[cell_of(face)];
+        in_order[*place as usize] = face;
+        *place += 1;
+    }
+    in_order
+}
+
+/// Clips `candidates` by the faces of `lists`, adds what is left to `found`, and hands each opaque
+/// piece to `see`.
+fn clip_all(
+    context: &Context,
+    candidates: &[FaceId],
+    lists: &[&CellLists],
+    found: &mut Found,
+    report: &mut Report,
+    see: impl Fn(&mut Scratch, &mut dyn Iterator<Item = DVec2>, &Affine) + Sync,
+) {
+    let piles: Vec<Pile> = candidates
+        .par_chunks(FACES_PER_TASK)
+        .map_init(
+            || (Clipper::new(*context), Scratch::default()),
+            |(clipper, scratch), candidates| {
+                let mut pile = Pile::default();
+                for &face in candidates {
+                    clipper.clip(face, lists);
+                    clipper.store(face, &mut pile);
+                    if !context.faces.is_veil(face) {
+                        let plane = context.faces.face_nearness(face);
+                        for piece in clipper.pieces.iter() {
+                            see(scratch, &mut piece.iter().map(|corner| corner.point), plane);
+                        }
+                    }
+                }
+                pile
+            },
+        )
+        .collect();
+    for pile in piles {
+        report.count(&pile);
+        found.add(pile);
+    }
+}

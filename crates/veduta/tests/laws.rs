@@ -1,0 +1,333 @@
+//! The laws of visibility, on random scenes: area (law 1) and same bytes (law 5).
+//!
+//! Every engine goes through the same scenes. A failing case prints its seed; set `VEDUTA_SEED` to
+//! look at that scene alone.
+
+mod support;
+
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use support::coverage::{self, largest_difference};
+use support::samples;
+use support::scenes::{LARGE, Scene};
+use veduta::geometry::{DVec2, DVec3};
+use veduta::map::{Camera, Faces, Fragment, Projection, Side, VisibilityMap};
+use veduta::visibility::{Seen, cross_scanline};
+
+/// A way to find visibility, and its name.
+type Engine = (&'static str, fn(&Scene) -> Seen);
+
+/// The engines under test. They are compared with the first one, which cuts the frame into a strip
+/// for each row of pixels, like the paper.
+const ENGINES: [Engine; 3] = [
+    ("sweep, a strip for each row", |scene| {
+        sweep(&scene.faces, scene.height)
+    }),
+    ("sweep, strips of three and a half rows", |scene| {
+        sweep(&scene.faces, scene.height * 2 / 7)
+    }),
+    ("sweep, strips out of step with the rows", |scene| {
+        sweep(&scene.faces, 7)
+    }),
+];
+
+fn sweep(faces: &Faces, strips: u32) -> Seen {
+    cross_scanline::find(
+        faces,
+        &cross_scanline::Settings {
+            strips: strips.max(1),
+        },
+    )
+}
+
+/// Law 1: coverage per face and pixel, in square pixels.
+const TOLERANCE: f64 = 1e-9;
+
+/// Random scenes; a tenth of them have more than 5,000 faces.
+const SCENES: u64 = if cfg!(debug_assertions) { 300 } else { 10_000 };
+
+/// The seeds of a test: `count` of them, or the one to look at.
+fn seeds(count: u64) -> Vec<u64> {
+    match std::env::var("VEDUTA_SEED") {
+        Ok(seed) => vec![seed.parse().expect("VEDUTA_SEED is a number")],
+        Err(_) => (0..count).collect(),
+    }
+}
+
+#[test]
+fn all_engines_see_the_same_areas() {
+    let [large, piercing, ties, veils] = [0; 4].map(AtomicUsize::new);
+    let seeds = seeds(SCENES);
+    let failures: Vec<String> = seeds
+        .par_iter()
+        .filter_map(|&seed| {
+            let scene = Scene::random(seed);
+            let results = ENGINES.map(|(name, find)| (name, find(&scene)));
+            let count = |counter: &AtomicUsize, does: bool| {
+                counter.fetch_add(usize::from(does), Ordering::Relaxed);
+            };
+            count(&large, scene.faces.len() > LARGE);
+            count(&piercing, has_piercing(&results[0].1));
+            count(&ties, has_ties(&scene.faces, &results[0].1));
+            count(&veils, !results[0].1.veils.is_empty());
+            same_areas(&scene, &results)
+                .err()
+                .map(|error| format!("{scene}: {error}"))
+        })
+        .collect();
+    let counts = [large, piercing, ties, veils].map(AtomicUsize::into_inner);
+    println!(
+        "{} scenes: {} of more than {LARGE} faces, {} with faces that pierce each other, {} with \
+         ties of coplanar faces, {} with veils",
+        seeds.len(),
+        counts[0],
+        counts[1],
+        counts[2],
+        counts[3]
+    );
+    report(&failures);
+    if seeds.len() > 1 {
+        assert!(counts.iter().all(|&count| count > 0), "a kind is missing");
+    }
+}
+
+fn report(failures: &[String]) {
+    let some = failures.iter().take(10).cloned().collect::<Vec<_>>();
+    assert!(
+        failures.is_empty(),
+        "{} scenes fail:\n{}",
+        failures.len(),
+        some.join("\n")
+    );
+}
+
+fn same_areas(scene: &Scene, results: &[(&str, Seen)]) -> Result<(), String> {
+    let pixels = scene.width * scene.height;
+    let mut first = None;
+    for (name, seen) in results {
+        let fail = |what: String| Err(format!("{name}: {what}"));
+        if let Err(broken) = map_of(&scene.faces, seen).check() {
+            return fail(broken.to_string());
+        }
+        let [opaque, veils] = [&seen.opaque, &seen.veils]
+            .map(|fragments| coverage::measure(&scene.faces, fragments, scene.width, scene.height));
+        let (least, greatest) = coverage::sums(&opaque, pixels);
+        if greatest > 1.0 + TOLERANCE {
+            return fail(format!(
+                "opaque areas of a pixel sum to 1 + {:e}",
+                greatest - 1.0
+            ));
+        }
+        if scene.is_covered && least < 1.0 - TOLERANCE {
+            return fail(format!("{:e} of a pixel is uncovered", 1.0 - least));
+        }
+        let Some((first_opaque, first_veils)) = &first else {
+            first = Some((opaque, veils));
+            continue;
+        };
+        for (what, one, other) in [
+            ("opaque", first_opaque, &opaque),
+            ("veil", first_veils, &veils),
+        ] {
+            let difference = largest_difference(one, other);
+            if !(difference.size() <= TOLERANCE) {
+                return fail(format!("{what} {difference:?}, {:e}", difference.size()));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn map_of(faces: &Faces, seen: &Seen) -> VisibilityMap {
+    let projection = Projection::Parallel {
+        height: 1.0,
+        aspect: 1.0,
+    };
+    VisibilityMap {
+        camera: Camera::looking(DVec3::ZERO, DVec3::Y, DVec3::Z, projection, 0.0)
+            .expect("a level view"),
+        faces: faces.clone(),
+        opaque: seen.opaque.clone(),
+        veils: seen.veils.clone(),
+    }
+}
+
+fn sides(seen: &Seen) -> impl Iterator<Item = (Fragment<'_>, [DVec2; 2], Side)> {
+    seen.opaque
+        .iter()
+        .chain(seen.veils.iter())
+        .flat_map(|fragment| {
+            let (vertices, sides) = match fragment {
+                Fragment::Whole(_) => (&[][..], &[][..]),
+                Fragment::Cut {
+                    vertices, sides, ..
+                } => (vertices, sides),
+            };
+            sides.iter().enumerate().map(move |(index, &side)| {
+                let ends = [vertices[index], vertices[(index + 1) % vertices.len()]];
+                (fragment, ends, side)
+            })
+        })
+}
+
+fn has_piercing(seen: &Seen) -> bool {
+    sides(seen).any(|(_, _, side)| side.kind == Side::CROSSING)
+}
+
+/// Whether the edge of one face bounds another one of the same plane.
+fn has_ties(faces: &Faces, seen: &Seen) -> bool {
+    sides(seen).any(|(fragment, _, side)| {
+        side.kind < Side::SCAN
+            && side.face < fragment.face()
+            && faces.face_nearness(side.face) == faces.face_nearness(fragment.face())
+    })
+}
+
+#[test]
+fn areas_are_those_that_samples_find() {
+    let count = if cfg!(debug_assertions) { 8 } else { 96 };
+    let failures: Vec<String> = seeds(count)
+        .par_iter()
+        .filter_map(|&seed| {
+            let mut scene = Scene::small(seed);
+            (scene.width, scene.height) = (8, 6);
+            let shares = samples::sample(&scene.faces, scene.width, scene.height, seed);
+            ENGINES.iter().find_map(|(name, find)| {
+                let seen = find(&scene);
+                let fragments = [(&seen.opaque, &shares.opaque), (&seen.veils, &shares.veils)];
+                fragments.into_iter().find_map(|(fragments, shares)| {
+                    let coverage =
+                        coverage::measure(&scene.faces, fragments, scene.width, scene.height);
+                    unlikely(&coverage, shares)
+                        .map(|what| format!("{scene}, without its own size: {name}: {what}"))
+                })
+            })
+        })
+        .collect();
+    report(&failures);
+}
+
+/// A part whose area the samples contradict.
+fn unlikely(coverage: &[coverage::Part], shares: &[(u32, u32, f64)]) -> Option<String> {
+    let share = |pixel: u32, face: u32| {
+        shares
+            .binary_search_by_key(&(pixel, face), |&(pixel, face, _)| (pixel, face))
+            .map_or(0.0, |index| shares[index].2)
+    };
+    let is_measured = |pixel: u32, face: u32| {
+        coverage
+            .binary_search_by_key(&(pixel, face), |part| (part.pixel, part.face))
+            .is_ok()
+    };
+    let wrong = coverage.iter().find_map(|part| {
+        let share = share(part.pixel, part.face);
+        let tolerance = samples::tolerance(part.perimeter, part.fragments);
+        (!((part.area - share).abs() <= tolerance))
+            .then(|| format!("{part:?}, but {share} of the samples, +- {tolerance}"))
+    });
+    wrong.or_else(|| {
+        shares
+            .iter()
+            .find(|&&(pixel, face, _)| !is_measured(pixel, face))
+            .map(|missing| format!("no area for the samples (pixel, face, share) {missing:?}"))
+    })
+}
+
+#[test]
+fn sides_lie_on_the_lines_they_name() {
+    let failures: Vec<String> = seeds(SCENES / 20)
+        .par_iter()
+        .filter_map(|&seed| {
+            let scene = Scene::small(seed);
+            ENGINES.iter().find_map(|(name, find)| {
+                let seen = find(&scene);
+                sides(&seen).find_map(|(fragment, ends, side)| {
+                    let off = ends
+                        .map(|end| distance_from_line(&scene.faces, &fragment, side, end))
+                        .into_iter()
+                        .fold(0.0, f64::max);
+                    // Far below anything visible, far above rounding.
+                    (!(off <= 1e-13)).then(|| {
+                        format!("{scene}: {name}: {side:?} of {fragment:?} is off by {off:e}")
+                    })
+                })
+            })
+        })
+        .collect();
+    report(&failures);
+}
+
+/// How far `point` is from the line that `side` names, in the image plane.
+fn distance_from_line(faces: &Faces, fragment: &Fragment, side: Side, point: DVec2) -> f64 {
+    match side.kind {
+        Side::SCAN => 0.0,
+        Side::CROSSING => {
+            let own = faces.face_nearness(fragment.face());
+            let difference = own.minus(faces.face_nearness(side.face));
+            let scale = difference.a.hypot(difference.b);
+            // What is left of the difference is as unsure as its terms.
+            difference.at(point).abs() / scale
+        }
+        index => {
+            let outline = faces.outline(side.face);
+            let from = outline[index as usize];
+            let to = outline[(index as usize + 1) % outline.len()];
+            let along =
+                ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
+            point.distance(from + (to - from) * along)
+        }
+    }
+}
+
+#[test]
+fn both_sides_of_a_scanline_show_the_same_face() {
+    /// Further than rounding, nearer than anything in the scenes that are looked at.
+    const NEXT: f64 = 1e-9;
+    let failures: Vec<String> = seeds(SCENES / 5)
+        .par_iter()
+        .filter_map(|&seed| {
+            let scene = Scene::small(seed);
+            let has_hairs =
+                ["slivers", "near-vertical", "mixture", "grazing"].contains(&scene.kind);
+            if has_hairs || scene.faces.ids().any(|face| scene.faces.is_veil(face)) {
+                return None;
+            }
+            ENGINES.iter().find_map(|(name, find)| {
+                let seen = find(&scene);
+                sides(&seen).find_map(|(fragment, [from, to], side)| {
+                    let is_long = from.distance(to) > 100.0 * NEXT;
+                    if side.kind != Side::SCAN || !is_long {
+                        return None;
+                    }
+                    // The fragment is on the other side: it is wound positively.
+                    let outwards = -(to - from).perp().normalize() * NEXT;
+                    let next = 0.5 * (from + to) + outwards;
+                    let seen_there = samples::nearest_at(&scene.faces, next);
+                    (seen_there != Some(fragment.face())).then(|| {
+                        format!("{scene}: {name}: {seen_there:?} next to {fragment:?} at {next}")
+                    })
+                })
+            })
+        })
+        .collect();
+    report(&failures);
+}
+
+#[test]
+fn the_number_of_threads_makes_no_difference() {
+    let pool = |threads| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool of threads")
+    };
+    let (one, three) = (pool(1), pool(3));
+    for seed in seeds(SCENES / 100) {
+        let scene = Scene::random(seed);
+        for (name, find) in ENGINES {
+            let alone = one.install(|| find(&scene));
+            let together = three.install(|| find(&scene));
+            assert!(alone == together, "{scene}: {name} depends on threads");
+        }
+    }
+}
