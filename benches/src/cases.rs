@@ -104,6 +104,15 @@ impl Case {
         }
     }
 
+    /// A picture of the case's size in which nothing has been drawn yet.
+    pub fn empty_picture(&self) -> Picture {
+        Picture {
+            width: self.width,
+            height: self.height,
+            pixels: vec![[0.0; 4]; self.width as usize * self.height as usize],
+        }
+    }
+
     /// Fills `map`, made by [`Case::empty_map`], and makes its picture.
     pub fn picture_exactly(&self, map: &mut VisibilityMap) -> Picture {
         let Seen { opaque, veils } = self.find_exactly();
@@ -148,7 +157,8 @@ mod tests {
             let scanned = spans.picture(|face| case.color(face));
             let mut buffer = ZBuffer::new(32 * case.width, 32 * case.height);
             buffer.find(&case.faces);
-            let sampled = buffer.resolve(32, |face| case.color(face));
+            let mut sampled = case.empty_picture();
+            buffer.resolve(32, |face| case.color(face), &mut sampled);
             // An edge along the rows is off by half a sub-scanline, or half a row of samples.
             for (method, picture, bound) in
                 [("multiscan", scanned, 0.006), ("samples", sampled, 0.03)]

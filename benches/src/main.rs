@@ -5,6 +5,7 @@
 
 use std::hint::black_box;
 use std::process::ExitCode;
+use veduta::accumulate::Picture;
 use veduta::map::VisibilityMap;
 use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
@@ -186,14 +187,14 @@ fn sub_scanlines(case: &Case) -> Vec<String> {
 /// The z-buffer and the exact map; both to pixels.
 fn against_zbuffer(case: &Case) -> Vec<String> {
     let mut buffer = ZBuffer::new(case.width, case.height);
-    let mut resolved = buffer.clone();
+    let mut sampling = Supersampling::new(case, 1);
     let mut map = case.empty_map();
     let [z, find, z_picture, exact] = least_times(
         ROUNDS,
         [
             &mut || buffer.find(&case.faces),
             &mut || exact_map(case),
-            &mut || supersample(case, &mut resolved, 1),
+            &mut || sampling.run(case),
             &mut || exact_picture(case, &mut map),
         ],
     )
@@ -213,16 +214,15 @@ fn against_zbuffer(case: &Case) -> Vec<String> {
 /// All methods.
 fn engines(case: &Case) -> Vec<String> {
     let mut buffer = ZBuffer::new(case.width, case.height);
-    let mut resolved = buffer.clone();
-    let [mut fours, mut eights] = [4, 8].map(|n| ZBuffer::new(n * case.width, n * case.height));
+    let [mut one, mut four, mut eight] = [1, 4, 8].map(|n| Supersampling::new(case, n));
     let mut map = case.empty_map();
     let times = least_times(
         ROUNDS,
         [
             &mut || buffer.find(&case.faces),
-            &mut || supersample(case, &mut resolved, 1),
-            &mut || supersample(case, &mut fours, 4),
-            &mut || supersample(case, &mut eights, 8),
+            &mut || one.run(case),
+            &mut || four.run(case),
+            &mut || eight.run(case),
             &mut || multiscan_picture(case, 4),
             &mut || multiscan_picture(case, 8),
             &mut || exact_map(case),
@@ -248,9 +248,29 @@ fn multiscan_picture(case: &Case, n: u32) {
     black_box(spans.picture(|face| case.color(face)));
 }
 
-fn supersample(case: &Case, buffer: &mut ZBuffer, n: usize) {
-    buffer.find(&case.faces);
-    black_box(buffer.resolve(n, |face| case.color(face)));
+/// A z-buffer with `n` x `n` samples for each pixel, and the picture made of it.
+struct Supersampling {
+    n: u32,
+    buffer: ZBuffer,
+    picture: Picture,
+}
+
+impl Supersampling {
+    fn new(case: &Case, n: u32) -> Self {
+        Self {
+            n,
+            buffer: ZBuffer::new(n * case.width, n * case.height),
+            picture: case.empty_picture(),
+        }
+    }
+
+    fn run(&mut self, case: &Case) {
+        self.buffer.find(&case.faces);
+        let color = |face| case.color(face);
+        self.buffer
+            .resolve(self.n as usize, color, &mut self.picture);
+        black_box(&self.picture);
+    }
 }
 
 /// Three digits or more, as the spread allows no others.
