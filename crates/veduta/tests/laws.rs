@@ -7,6 +7,7 @@ mod support;
 
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 use support::coverage::{self, largest_difference};
 use support::samples;
 use support::scenes::{LARGE, Scene};
@@ -131,7 +132,7 @@ fn same_areas(scene: &Scene, results: &[(&str, Seen)]) -> Result<(), String> {
         ] {
             let difference = largest_difference(one, other);
             if !(difference.size() <= TOLERANCE) {
-                return fail(format!("{what} {difference:?}, {:e}", difference.size()));
+                return fail(format!("{what} {difference}"));
             }
         }
     }
@@ -329,5 +330,33 @@ fn the_number_of_threads_makes_no_difference() {
             let together = three.install(|| find(&scene));
             assert!(alone == together, "{scene}: {name} depends on threads");
         }
+    }
+}
+
+/// Prints what engines and measuring take for scenes of each kind, in milliseconds of one thread.
+#[test]
+#[ignore = "prints times, proves nothing"]
+fn times() {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a pool of threads");
+    for seed in seeds(120) {
+        let scene = Scene::random(seed);
+        let [mut times, mut fragments] = [String::new(), String::new()];
+        for (_, find) in ENGINES {
+            let start = Instant::now();
+            let seen = pool.install(|| find(&scene));
+            let found = Instant::now();
+            coverage::measure(&scene.faces, &seen.opaque, scene.width, scene.height);
+            let (find, measure) = (found - start, found.elapsed());
+            times += &format!(
+                " {:8.2} + {:6.2}",
+                1e3 * find.as_secs_f64(),
+                1e3 * measure.as_secs_f64()
+            );
+            fragments += &format!(" {}", seen.opaque.len());
+        }
+        println!("{times} ms, fragments{fragments}: {scene}");
     }
 }

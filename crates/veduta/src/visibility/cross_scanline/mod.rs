@@ -158,3 +158,8 @@ fn between(ends: [f64; 2], along: f64) -> f64 {
     let value = ends[0] + (ends[1] - ends[0]) * along;
     value.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
 }
+
+/// Whether two lines are one between two V-scanlines, where `one` and `other` are their y.
+fn is_same_y(one: [f64; 2], other: [f64; 2]) -> bool {
+    (one[0] - other[0]).abs() <= ROUNDING && (one[1] - other[1]).abs() <= ROUNDING
+}

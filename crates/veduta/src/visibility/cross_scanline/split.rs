@@ -9,7 +9,7 @@
 
 use super::emit::Layer;
 use super::h_scan::Slice;
-use super::{Bound, Piece, ROUNDING, Trapezoid, between};
+use super::{Bound, Piece, ROUNDING, Trapezoid, between, is_same_y};
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces};
 
@@ -239,11 +239,14 @@ impl Splitter {
         for &(covering, part) in &self.nearest {
             opaque.stack(covering.piece(part));
         }
+        // What rounding may have hidden does not keep a face from being seen whole.
+        let matters = !shape.is_negligible();
         for covering in &self.opaque {
-            hidden[covering.slice as usize] |= self
-                .nearest
-                .iter()
-                .any(|(seen, _)| seen.face != covering.face);
+            hidden[covering.slice as usize] |= matters
+                && self
+                    .nearest
+                    .iter()
+                    .any(|(seen, _)| seen.face != covering.face);
         }
         for &veil in &self.veils {
             if self.nearest.is_empty() {
@@ -252,9 +255,9 @@ impl Splitter {
             for &(front, part) in &self.nearest {
                 match compare(faces, veil.face, front.face, &part) {
                     Order::Front => veils.stack(veil.piece(part)),
-                    Order::Behind => hidden[veil.slice as usize] = true,
+                    Order::Behind => hidden[veil.slice as usize] |= matters,
                     Order::Crossing(parts) => {
-                        hidden[veil.slice as usize] = true;
+                        hidden[veil.slice as usize] |= matters;
                         for seen in parts.iter().filter(|part| part.first_is_front) {
                             veils.stack(veil.piece(seen.shape));
                         }
@@ -278,16 +281,13 @@ impl Splitter {
             let slice = &slices[index as usize];
             let [top, bottom] = self.here[member as usize];
             // A face prefers its own name for a bound that it shares with others.
-            let is_same = |y: [f64; 2], own: [f64; 2]| {
-                (y[0] - own[0]).abs() <= ROUNDING && (y[1] - own[1]).abs() <= ROUNDING
-            };
             let own = |is_own: bool, own: Bound, bound: Bound| if is_own { own } else { bound };
             let covering = Covering {
                 face: slice.face,
                 slice: index,
-                above: own(is_same(shape.top, top), slice.top.bound, shape.above),
+                above: own(is_same_y(shape.top, top), slice.top.bound, shape.above),
                 below: own(
-                    is_same(shape.bottom, bottom),
+                    is_same_y(shape.bottom, bottom),
                     slice.bottom.bound,
                     shape.below,
                 ),
