@@ -15,22 +15,43 @@ use veduta::geometry::{DVec2, DVec3};
 use veduta::map::{Camera, Faces, Fragment, Projection, Side, VisibilityMap};
 use veduta::visibility::{Seen, cross_scanline};
 
-/// A way to find visibility, and its name.
-type Engine = (&'static str, fn(&Scene) -> Seen);
+/// A way to find visibility.
+struct Engine {
+    name: &'static str,
+    find: fn(&Scene) -> Seen,
+    /// Of the scenes with more than 5,000 faces it is tried on one in this many, to save time.
+    large_scenes: u64,
+}
 
 /// The engines under test. They are compared with the first one, which cuts the frame into a strip
 /// for each row of pixels, like the paper.
 const ENGINES: [Engine; 3] = [
-    ("sweep, a strip for each row", |scene| {
-        sweep(&scene.faces, scene.height)
-    }),
-    ("sweep, strips of three and a half rows", |scene| {
-        sweep(&scene.faces, scene.height * 2 / 7)
-    }),
-    ("sweep, strips out of step with the rows", |scene| {
-        sweep(&scene.faces, 7)
-    }),
+    Engine {
+        name: "sweep, a strip a row",
+        find: |scene| sweep(&scene.faces, scene.height),
+        large_scenes: 1,
+    },
+    Engine {
+        name: "sweep, 7 strips",
+        find: |scene| sweep(&scene.faces, 7),
+        large_scenes: 40,
+    },
+    Engine {
+        name: "sweep, 53 strips",
+        find: |scene| sweep(&scene.faces, 53),
+        large_scenes: 4,
+    },
 ];
+
+/// The engines to try on a scene.
+fn engines_for(scene: &Scene) -> impl Iterator<Item = &'static Engine> {
+    let is_large = scene.faces.len() > LARGE;
+    // Large scenes are every tenth.
+    let number = scene.seed / 10;
+    ENGINES
+        .iter()
+        .filter(move |engine| !is_large || number.is_multiple_of(engine.large_scenes))
+}
 
 fn sweep(faces: &Faces, strips: u32) -> Seen {
     cross_scanline::find(
@@ -63,7 +84,9 @@ fn all_engines_see_the_same_areas() {
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::random(seed);
-            let results = ENGINES.map(|(name, find)| (name, find(&scene)));
+            let results: Vec<(&str, Seen)> = engines_for(&scene)
+                .map(|engine| (engine.name, (engine.find)(&scene)))
+                .collect();
             let count = |counter: &AtomicUsize, does: bool| {
                 counter.fetch_add(usize::from(does), Ordering::Relaxed);
             };
@@ -193,7 +216,7 @@ fn areas_are_those_that_samples_find() {
             let mut scene = Scene::small(seed);
             (scene.width, scene.height) = (8, 6);
             let shares = samples::sample(&scene.faces, scene.width, scene.height, seed);
-            ENGINES.iter().find_map(|(name, find)| {
+            engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let seen = find(&scene);
                 let fragments = [(&seen.opaque, &shares.opaque), (&seen.veils, &shares.veils)];
                 fragments.into_iter().find_map(|(fragments, shares)| {
@@ -240,7 +263,7 @@ fn sides_lie_on_the_lines_they_name() {
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::small(seed);
-            ENGINES.iter().find_map(|(name, find)| {
+            engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let seen = find(&scene);
                 sides(&seen).find_map(|(fragment, ends, side)| {
                     let off = ends
@@ -293,7 +316,7 @@ fn both_sides_of_a_scanline_show_the_same_face() {
             if has_hairs || scene.faces.ids().any(|face| scene.faces.is_veil(face)) {
                 return None;
             }
-            ENGINES.iter().find_map(|(name, find)| {
+            engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let seen = find(&scene);
                 sides(&seen).find_map(|(fragment, [from, to], side)| {
                     let is_long = from.distance(to) > 100.0 * NEXT;
@@ -325,7 +348,7 @@ fn the_number_of_threads_makes_no_difference() {
     let (one, three) = (pool(1), pool(3));
     for seed in seeds(SCENES / 100) {
         let scene = Scene::random(seed);
-        for (name, find) in ENGINES {
+        for Engine { name, find, .. } in engines_for(&scene) {
             let alone = one.install(|| find(&scene));
             let together = three.install(|| find(&scene));
             assert!(alone == together, "{scene}: {name} depends on threads");
@@ -344,7 +367,7 @@ fn times() {
     for seed in seeds(120) {
         let scene = Scene::random(seed);
         let [mut times, mut fragments] = [String::new(), String::new()];
-        for (_, find) in ENGINES {
+        for Engine { find, .. } in engines_for(&scene) {
             let start = Instant::now();
             let seen = pool.install(|| find(&scene));
             let found = Instant::now();
