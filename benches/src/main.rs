@@ -28,7 +28,7 @@ Columns: map is the exact map alone, exact the map and its pixels.
 Without scenes, those that the documentation tells of.";
 
 /// Rounds of measuring, for scenes that do not take long.
-const ROUNDS: u32 = 7;
+const ROUNDS: u32 = 5;
 
 /// A table: what it tells of each scene, and of which scenes unless told.
 struct Measurement {
