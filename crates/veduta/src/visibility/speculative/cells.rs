@@ -1,7 +1,7 @@
 //! Which faces may be seen, and in which cells they may hide others.
 
 use super::clip::Context;
-use super::grid::Extent;
+use super::grid::{CellSet, Extent};
 use super::guess::OPEN;
 use rayon::prelude::*;
 use veduta_map::FaceId;
@@ -42,10 +42,11 @@ fn reaches(nearness: f64, threshold: f32) -> bool {
 
 /// The faces that may be seen somewhere, ascending, and where.
 ///
-/// With thresholds `before`, only what those left out and `thresholds` let in.
+/// With the thresholds before they were lowered, and the cells in which they were: only what those
+/// left out and `thresholds` let in.
 pub(super) fn listed_between(
     context: &Context,
-    before: Option<&[f32]>,
+    before: Option<(&[f32], &CellSet)>,
     thresholds: &[f32],
 ) -> (Vec<FaceId>, CellLists) {
     let count = context.faces.len();
@@ -83,7 +84,7 @@ struct Chunk {
 impl Chunk {
     fn list(
         context: &Context,
-        before: Option<&[f32]>,
+        before: Option<(&[f32], &CellSet)>,
         thresholds: &[f32],
         range: std::ops::Range<usize>,
     ) -> Self {
@@ -100,6 +101,9 @@ impl Chunk {
         for index in range {
             let face = FaceId(index as u32);
             let extent = &extents[index];
+            if before.is_some_and(|(_, lowered)| !lowered.meets(&grid.span(extent))) {
+                continue;
+            }
             let nearest = f64::from(extent.nearness[1]);
             let plane = faces.face_nearness(face);
             let is_veil = faces.is_veil(face);
@@ -107,7 +111,7 @@ impl Chunk {
             grid.each_row(faces.outline(face), extent, |row, columns| {
                 for column in columns {
                     let cell = grid.index(column, row);
-                    if before.is_some_and(|before| before[cell] == thresholds[cell]) {
+                    if before.is_some_and(|(_, lowered)| !lowered.contains(cell)) {
                         continue;
                     }
                     let reaches = |threshold: f32| {
@@ -118,7 +122,7 @@ impl Chunk {
                         if chunk.guessed.last() != Some(&(cell as u32)) {
                             chunk.guessed.push(cell as u32);
                         }
-                    } else if !before.is_some_and(|before| reaches(before[cell])) {
+                    } else if !before.is_some_and(|(before, _)| reaches(before[cell])) {
                         admitted = true;
                         if !is_veil {
                             chunk.listed.push((cell as u32, index as u32));

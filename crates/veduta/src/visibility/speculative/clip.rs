@@ -6,9 +6,10 @@ use super::cells::CellLists;
 use super::found::Pile;
 use super::grid::{Extent, Grid};
 use super::pieces::{Corner, Depth, Pieces, crossing_tolerance};
-use super::sides::{Sides, later_sides_separate};
+use super::sides::{LANES, Sides, later_sides_separate};
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces};
+use wide::f64x4;
 
 /// What all clips share.
 #[derive(Clone, Copy)]
@@ -152,21 +153,22 @@ impl<'a> Occludee<'a> {
         if self.sides.separate(other) {
             return None;
         }
-        let depth = self.order(occluder, other);
-        if depth == Depth::Behind {
+        let sides = Sides::group(other, 0);
+        let depth = self.order(occluder, other, &sides);
+        if depth == Depth::Behind
+            || sides.separate(self.outline)
+            || later_sides_separate(self.outline, other)
+            || later_sides_separate(other, self.outline)
+        {
             return None;
         }
-        let sides = Sides::group(other, 0);
-        let apart = sides.separate(self.outline)
-            || later_sides_separate(self.outline, other)
-            || later_sides_separate(other, self.outline);
-        (!apart).then_some((depth, sides))
+        Some((depth, sides))
     }
 
     /// Which of the two is in front. Both sides of a pair come to the same answer: a difference of
     /// planes is exactly antisymmetric.
     #[inline]
-    fn order(&self, occluder: FaceId, other: &[DVec2]) -> Depth {
+    fn order(&self, occluder: FaceId, other: &[DVec2], sides: &Sides) -> Depth {
         let by_key = if occluder < self.face {
             Depth::InFront
         } else {
@@ -177,18 +179,20 @@ impl<'a> Occludee<'a> {
         }
         let difference = self.faces.face_nearness(occluder).minus(self.plane);
         let tolerance = crossing_tolerance(&difference);
-        for outline in [self.outline, other] {
-            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-            for &point in outline {
+        for (sides, outline) in [(&self.sides, self.outline), (sides, other)] {
+            let values = sides.at_starts(&difference);
+            let mut in_front = values.simd_gt(f64x4::splat(tolerance)).any();
+            let mut behind = values.simd_lt(f64x4::splat(-tolerance)).any();
+            for &point in outline.iter().skip(LANES) {
                 let value = difference.at(point);
-                low = low.min(value);
-                high = high.max(value);
+                in_front |= value > tolerance;
+                behind |= value < -tolerance;
             }
-            match (low >= -tolerance, high <= tolerance) {
-                (true, true) => return by_key,
+            match (in_front, behind) {
+                (false, false) => return by_key,
                 (true, false) => return Depth::InFront,
                 (false, true) => return Depth::Behind,
-                (false, false) => {}
+                (true, true) => {}
             }
         }
         Depth::Crossing(difference)

@@ -179,5 +179,55 @@ impl Grid {
     }
 }
 
+/// Some cells of a grid, and an answer to "is any of them in this box" that costs four look-ups.
+pub(super) struct CellSet {
+    columns: usize,
+    marked: Vec<bool>,
+    /// Number of marked cells above and left of each corner of cells.
+    before: Vec<u32>,
+}
+
+impl CellSet {
+    pub fn new(grid: &Grid, marked: Vec<bool>) -> Self {
+        let columns = grid.columns as usize;
+        let mut before = vec![0; (columns + 1) * (grid.rows as usize + 1)];
+        for (row, cells) in marked.chunks(columns).enumerate() {
+            let (above, here) = before[row * (columns + 1)..].split_at_mut(columns + 1);
+            let mut in_row = 0;
+            for (column, &marked) in cells.iter().enumerate() {
+                in_row += u32::from(marked);
+                here[column + 1] = above[column + 1] + in_row;
+            }
+        }
+        Self {
+            columns,
+            marked,
+            before,
+        }
+    }
+
+    #[inline]
+    pub fn contains(&self, cell: usize) -> bool {
+        self.marked[cell]
+    }
+
+    /// All marked cells.
+    pub fn cells(&self) -> impl Iterator<Item = usize> {
+        let cells = self.marked.iter().enumerate();
+        cells.filter_map(|(cell, &marked)| marked.then_some(cell))
+    }
+
+    /// Whether a cell of the box is marked.
+    #[inline]
+    pub fn meets(&self, span: &Span) -> bool {
+        let at = |column: u32, row: u32| {
+            self.before[row as usize * (self.columns + 1) + column as usize]
+        };
+        let [left, right] = [span.columns[0], span.columns[1] + 1];
+        let [top, bottom] = [span.rows[0], span.rows[1] + 1];
+        at(right, bottom) + at(left, top) != at(left, bottom) + at(right, top)
+    }
+}
+
 /// How far beyond a row of cells an outline counts as touching it: rounding of image coordinates.
 const ROW_MARGIN: f64 = 1e-12;

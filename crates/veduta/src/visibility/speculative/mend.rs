@@ -3,6 +3,7 @@
 use super::cells::{CellLists, listed_between};
 use super::clip::{Clipper, Context};
 use super::found::{Entry, Found, Pile};
+use super::grid::CellSet;
 use super::verify::{Scratch, Verification};
 use super::{FACES_PER_TASK, Report, clip_all};
 use rayon::prelude::*;
@@ -40,15 +41,16 @@ pub(super) fn mend(
         }
 
         // What the lower thresholds let in, and only that.
-        let (mut fresh, admitted) = listed_between(context, Some(&before), thresholds);
-        fresh.retain(|face| !std::mem::replace(&mut is_candidate[face.index()], true));
-        report.candidates += fresh.len();
-
         let mut dirty = vec![false; cells];
         for &cell in &wrong {
             dirty[cell] = true;
         }
-        let changed = take_away(context, found, &admitted, &dirty, report);
+        let lowered = CellSet::new(context.grid, dirty.clone());
+        let (mut fresh, admitted) = listed_between(context, Some((&before, &lowered)), thresholds);
+        fresh.retain(|face| !std::mem::replace(&mut is_candidate[face.index()], true));
+        report.candidates += fresh.len();
+
+        let changed = take_away(context, found, &admitted, &lowered, report);
         layers.push(admitted);
         let all_layers: Vec<&CellLists> = layers.iter().collect();
         clip_all(context, &fresh, &all_layers, None, found, report);
@@ -56,15 +58,15 @@ pub(super) fn mend(
         // Prove anew the cells that were wrong and those of every face that changed.
         for &face in changed.iter().chain(&fresh) {
             let outline = context.faces.outline(face);
-            context
-                .grid
-                .each_row(outline, &context.extents[face.index()], |row, columns| {
-                    for column in columns {
-                        dirty[context.grid.index(column, row)] = true;
-                    }
-                    true
-                });
+            let extent = &context.extents[face.index()];
+            context.grid.each_row(outline, extent, |row, columns| {
+                for column in columns {
+                    dirty[context.grid.index(column, row)] = true;
+                }
+                true
+            });
         }
+        let dirty = CellSet::new(context.grid, dirty);
         prove_anew(context, verification, thresholds, found, &dirty);
     }
 }
@@ -75,13 +77,13 @@ fn take_away(
     context: &Context,
     found: &mut Found,
     admitted: &CellLists,
-    is_wrong: &[bool],
+    lowered: &CellSet,
     report: &mut Report,
 ) -> Vec<FaceId> {
     let (touched, untouched): (Vec<Entry>, Vec<Entry>) = found
         .entries
         .par_iter()
-        .partition(|entry| touches(context, entry.face, is_wrong));
+        .partition(|entry| touches(context, entry.face, lowered));
     let parts: Vec<(Pile, Vec<FaceId>)> = touched
         .par_chunks(FACES_PER_TASK)
         .map_init(
@@ -92,7 +94,7 @@ fn take_away(
                 for &entry in entries {
                     clipper.resume(entry.face, found.fragments(entry));
                     let before = clipper.pieces.losses();
-                    clipper.subtract_listed(entry.face, &[admitted], |cell| is_wrong[cell]);
+                    clipper.subtract_listed(entry.face, &[admitted], |cell| lowered.contains(cell));
                     if clipper.pieces.losses() != before {
                         changed.push(entry.face);
                     }
@@ -112,16 +114,19 @@ fn take_away(
     changed
 }
 
-/// Whether a face may reach into a marked cell.
-fn touches(context: &Context, face: FaceId, marked: &[bool]) -> bool {
-    let mut touched = false;
+/// Whether a face may reach into one of the cells.
+fn touches(context: &Context, face: FaceId, cells: &CellSet) -> bool {
     let extent = &context.extents[face.index()];
+    if !cells.meets(&context.grid.span(extent)) {
+        return false;
+    }
+    let mut touched = false;
     context
         .grid
         .each_row(context.faces.outline(face), extent, |row, columns| {
             touched = columns
                 .into_iter()
-                .any(|column| marked[context.grid.index(column, row)]);
+                .any(|column| cells.contains(context.grid.index(column, row)));
             !touched
         });
     touched
@@ -133,9 +138,9 @@ fn prove_anew(
     verification: &Verification,
     thresholds: &[f32],
     found: &Found,
-    dirty: &[bool],
+    dirty: &CellSet,
 ) {
-    for (cell, _) in dirty.iter().enumerate().filter(|(_, dirty)| **dirty) {
+    for cell in dirty.cells() {
         verification.reset(cell);
     }
     found
@@ -150,7 +155,7 @@ fn prove_anew(
             let plane = context.faces.face_nearness(face);
             for polygon in found.polygons(context.faces, entry) {
                 verification.add(context, scratch, thresholds, polygon, plane, |cell| {
-                    dirty[cell]
+                    dirty.contains(cell)
                 });
             }
         });

@@ -87,7 +87,7 @@ pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
     };
 
     let mut thresholds = if settings.guess {
-        guess::thresholds(faces, &extents, &grid, SAMPLES)
+        guess::thresholds(faces, &extents, &grid, samples_for(&grid))
     } else {
         vec![guess::OPEN; grid.cells()]
     };
@@ -130,6 +130,17 @@ pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
 
 /// Samples of the guess along each side of a cell.
 const SAMPLES: u32 = 4;
+
+/// Samples of the guess in all, above which cells have fewer of them: the guess would cost more than
+/// it saves.
+const MOST_SAMPLES: usize = 4 * 1024 * 1024;
+
+fn samples_for(grid: &Grid) -> u32 {
+    (1..SAMPLES).rev().fold(SAMPLES, |samples, fewer| {
+        let too_many = grid.cells() * (samples * samples) as usize > MOST_SAMPLES;
+        if too_many { fewer } else { samples }
+    })
+}
 
 /// Faces for each cell, by default.
 const FACES_PER_CELL: f64 = 8.0;

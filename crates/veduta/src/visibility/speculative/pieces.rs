@@ -150,26 +150,32 @@ impl Pieces {
         sides: &Sides,
         depth: Depth,
     ) -> bool {
-        let corners = piece.corners(&self.arena);
         let arena = self.arena.len();
         let kept = self.next.len();
         let [overlap, after] = &mut self.overlap;
         overlap.clear();
-        overlap.extend(corners.iter().map(|&corner| Measured {
+        overlap.extend(piece.corners(&self.arena).iter().map(|&corner| Measured {
             corner,
-            distance: [0.0; LANES],
+            distance: sides.inside(corner.point).to_array(),
         }));
 
         // Cut along one side of the occluder after the other: what lies outside is kept, what is
         // inside of all of them is the overlap.
         for first in (0..outline.len()).step_by(LANES) {
+            let later;
             let group = if first == 0 {
-                *sides
+                sides
             } else {
-                Sides::group(outline, first)
+                later = Sides::group(outline, first);
+                for measured in overlap.iter_mut() {
+                    measured.distance = later.inside(measured.corner.point).to_array();
+                }
+                &later
             };
-            let cutting = measure(overlap, &group);
-            if cutting == Cutting::Separated || first == 0 && separated_by_sides(overlap, outline) {
+            let cutting = Cutting::of(overlap, group);
+            let apart =
+                cutting == Cutting::Separated || first == 0 && separated_by_sides(overlap, outline);
+            if apart {
                 self.undo(arena, kept);
                 return false;
             }
@@ -273,21 +279,21 @@ enum Cutting {
     Lanes(u32),
 }
 
-/// Measures the corners' distances from the sides.
-#[inline]
-fn measure(piece: &mut [Measured], sides: &Sides) -> Cutting {
-    let mut nearest = f64x4::splat(f64::INFINITY);
-    let mut farthest = f64x4::splat(f64::NEG_INFINITY);
-    for measured in piece {
-        let distance = sides.inside(measured.corner.point);
-        nearest = nearest.fast_min(distance);
-        farthest = farthest.fast_max(distance);
-        measured.distance = distance.to_array();
+impl Cutting {
+    #[inline(always)]
+    fn of(piece: &[Measured], sides: &Sides) -> Self {
+        let mut nearest = f64x4::splat(f64::INFINITY);
+        let mut farthest = f64x4::splat(f64::NEG_INFINITY);
+        for measured in piece {
+            let distance = f64x4::from(measured.distance);
+            nearest = nearest.fast_min(distance);
+            farthest = farthest.fast_max(distance);
+        }
+        if farthest.simd_le(sides.tolerance).any() {
+            return Self::Separated;
+        }
+        Self::Lanes(nearest.simd_lt(-sides.tolerance).to_bitmask())
     }
-    if farthest.simd_le(sides.tolerance).any() {
-        return Cutting::Separated;
-    }
-    Cutting::Lanes(nearest.simd_lt(-sides.tolerance).to_bitmask())
 }
 
 /// Whether a side of the piece has all of `outline` on its outside.

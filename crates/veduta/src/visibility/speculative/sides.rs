@@ -3,7 +3,7 @@
 //! Nearly all polygons compared here are triangles, so one group of lanes holds all sides, and
 //! "does a side separate these two" is one question instead of three.
 
-use veduta_geometry::DVec2;
+use veduta_geometry::{Affine, DVec2};
 use wide::f64x4;
 
 /// Distance, in frame heights or widths, within which a point counts as lying on a line.
@@ -74,11 +74,24 @@ impl Sides {
     /// Whether all points lie outside or on one of the lines.
     #[inline(always)]
     pub fn separate(&self, points: &[DVec2]) -> bool {
-        let mut farthest = self.inside(points[0]);
-        for &point in &points[1..] {
-            farthest = farthest.fast_max(self.inside(point));
-        }
+        let farthest = if let &[p, q, r] = points {
+            let [p, q, r] = [p, q, r].map(|point| self.inside(point));
+            p.fast_max(q).fast_max(r)
+        } else {
+            let beyond_all = f64x4::splat(f64::NEG_INFINITY);
+            points.iter().fold(beyond_all, |farthest, &point| {
+                farthest.fast_max(self.inside(point))
+            })
+        };
         farthest.simd_le(self.tolerance).any()
+    }
+
+    /// A function at the points where the sides start.
+    #[inline(always)]
+    pub fn at_starts(&self, function: &Affine) -> f64x4 {
+        f64x4::splat(function.a) * self.start[0]
+            + f64x4::splat(function.b) * self.start[1]
+            + f64x4::splat(function.c)
     }
 }
 
