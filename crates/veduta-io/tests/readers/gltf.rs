@@ -28,7 +28,7 @@ fn nodes_place_their_meshes_and_name_them_by_their_path() {
     let mut glb = Glb::triangle();
     glb.json["nodes"] = json!([
         { "name": "car", "children": [1, 2, 3], "translation": [10, 0, 0] },
-        { "name": "wheel", "mesh": 0, "rotation": [0, 0, 0.7071067811865476, 0.7071067811865476] },
+        { "name": "wheel", "mesh": 0, "rotation": [0, 0, 0.5, 0.5] },
         { "name": "wheel", "mesh": 0, "scale": [2, 2, 2] },
         { "mesh": 0, "matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 84900.123456789, 447700.987654321, 0, 1] },
     ]);

@@ -1,6 +1,6 @@
 //! Wavefront OBJ, with its material libraries.
 //!
-//! Bytes -> [`parse`] (flat tables, faces cut into triangles by [`polygon`]) -> [`assemble`] (a mesh
+//! Bytes -> [`mod@parse`] (flat tables, faces cut into triangles by [`polygon`]) -> [`assemble`] (a mesh
 //! for each group) and [`mtl`] (materials) -> scene.
 //!
 //! Our own rather than the `tobj` crate, whose errors do not tell the line and which cuts every
