@@ -353,6 +353,38 @@ fn an_old_picture_is_replaced_and_survives_a_failure() {
     assert_eq!(png(folder.path("a.png")).0, 8);
 }
 
+/// Interrupted while it writes: 130, and nothing is left.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_no_partial_file() {
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+    let folder = Folder::new();
+    let before = folder.files();
+    let mut running = std::process::Command::new(assert_cmd::cargo::cargo_bin("veduta"))
+        .current_dir(folder.0.path())
+        .args(["render", "square.obj", "--size", "6000x6000", "-o", "a.png"])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program runs");
+    let start = Instant::now();
+    while folder.files() == before {
+        assert!(
+            start.elapsed() < Duration::from_secs(120),
+            "it never begins to write"
+        );
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let kill = std::process::Command::new("kill")
+        .args(["-INT", &running.id().to_string()])
+        .status()
+        .expect("kill is there");
+    assert!(kill.success());
+    let status = running.wait().expect("the program ends");
+    assert_eq!(status.code(), Some(130));
+    assert_eq!(folder.files(), before);
+}
+
 #[test]
 fn views_from_below_and_with_z_up_show_what_is_there() {
     let folder = Folder::new();

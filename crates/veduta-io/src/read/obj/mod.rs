@@ -55,7 +55,7 @@ pub(crate) fn read(
                 .into_owned(),
             name => name.to_owned(),
         };
-        finish_mesh(&mut mesh, &name, &Place::Line(1), warnings)?;
+        finish_mesh(&mut mesh, &name, &Place::Whole, warnings)?;
         scene.objects.push(Object {
             name,
             mesh: MeshId(scene.meshes.len() as u32),
