@@ -116,7 +116,12 @@ fn set_panic_message() {
         let place = panic
             .location()
             .map_or_else(String::new, |place| format!(" at {place}"));
-        let message = panic.payload_as_str().unwrap_or("no message");
+        let payload = panic.payload();
+        let message = payload
+            .downcast_ref::<&str>()
+            .copied()
+            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+            .unwrap_or("no message");
         say_error(format_args!(
             "internal error{place}: {message}; this is a fault of veduta: please report it, with \
              the command line and the input, at {}/issues",

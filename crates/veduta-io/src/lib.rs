@@ -7,10 +7,12 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
+#[cfg(any(feature = "gltf", feature = "obj"))]
 mod read;
 pub mod tone;
 mod write;
 
+#[cfg(any(feature = "gltf", feature = "obj"))]
 pub use read::{
     ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
     read_scene,

@@ -7,16 +7,14 @@
 
 mod budget;
 mod error;
-#[cfg(any(feature = "gltf", feature = "obj"))]
 mod files;
 mod finish;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(any(feature = "gltf", feature = "obj"))]
+#[cfg(feature = "gltf")]
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
-#[cfg(any(feature = "gltf", feature = "obj"))]
 mod picture;
 
 pub use error::{ErrorKind, Place, Problem, ReadError, Warning};

@@ -28,7 +28,7 @@ fn nodes_place_their_meshes_and_name_them_by_their_path() {
     let mut glb = Glb::triangle();
     glb.json["nodes"] = json!([
         { "name": "car", "children": [1, 2, 3], "translation": [10, 0, 0] },
-        { "name": "wheel", "mesh": 0, "rotation": [0, 0, 0.7071067811865476, 0.7071067811865476] },
+        { "name": "wheel", "mesh": 0, "rotation": [0, 0, 0.5, 0.5] },
         { "name": "wheel", "mesh": 0, "scale": [2, 2, 2] },
         { "mesh": 0, "matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 84900.123456789, 447700.987654321, 0, 1] },
     ]);
@@ -188,6 +188,31 @@ fn materials_bring_colour_texture_opacity_and_emission() {
         ("two", 2, 1)
     );
     assert_eq!(image.pixels, [[255, 0, 0, 255], [0, 0, 255, 128]]);
+}
+
+#[test]
+fn older_materials_and_second_texture_coordinates_are_understood() {
+    let mut glb = Glb::triangle();
+    let view = glb.view(&small_png());
+    glb.add("images", json!({ "bufferView": view }));
+    glb.add("textures", json!({ "source": 0 }));
+    glb.json["extensionsRequired"] = json!(["KHR_materials_pbrSpecularGlossiness"]);
+    glb.add(
+        "materials",
+        json!({ "extensions": { "KHR_materials_pbrSpecularGlossiness": {
+            "diffuseFactor": [1, 0.5, 0, 1], "diffuseTexture": { "index": 0, "texCoord": 1 },
+        } } }),
+    );
+    let first = glb.f32s("VEC2", &[0.0; 6]);
+    let second = glb.f32s("VEC2", &[0.25; 6]);
+    let primitive = &mut glb.json["meshes"][0]["primitives"][0];
+    primitive["material"] = json!(0);
+    primitive["attributes"]["TEXCOORD_0"] = json!(first);
+    primitive["attributes"]["TEXCOORD_1"] = json!(second);
+    let scene = scene(&glb);
+    assert_eq!(scene.materials[0].base_color, [1.0, 0.5, 0.0, 1.0]);
+    assert!(scene.materials[0].base_color_texture.is_some());
+    assert_eq!(scene.meshes[0].texcoords, [Vec2::splat(0.25); 3]);
 }
 
 #[test]

@@ -15,6 +15,9 @@ impl Folder {
 
     pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.path().join(name);
+        // Cutting off an old file makes some file systems write to the disk at once, which tests with
+        // thousands of files would wait for.
+        let _ = std::fs::remove_file(&path);
         std::fs::write(&path, bytes).expect("may write in the test's folder");
         path
     }

@@ -7,7 +7,8 @@
 //!
 //! Extensions: KHR_mesh_quantization, KHR_texture_transform, KHR_materials_unlit,
 //! KHR_materials_emissive_strength, KHR_materials_pbrSpecularGlossiness (its colour). Skins, morph
-//! targets and animations are not applied: the model stands as its nodes place it.
+//! targets and animations are not applied: the model stands as its nodes place it. The opacity of
+//! vertex colours is not used.
 
 mod accessor;
 mod buffers;

@@ -1,6 +1,6 @@
 //! Wavefront OBJ, with its material libraries.
 //!
-//! Bytes -> [`parse`] (flat tables, faces cut into triangles by [`polygon`]) -> [`assemble`] (a mesh
+//! Bytes -> [`mod@parse`] (flat tables, faces cut into triangles by [`polygon`]) -> [`assemble`] (a mesh
 //! for each group) and [`mtl`] (materials) -> scene.
 //!
 //! Our own rather than the `tobj` crate, whose errors do not tell the line and which cuts every
@@ -55,7 +55,7 @@ pub(crate) fn read(
                 .into_owned(),
             name => name.to_owned(),
         };
-        finish_mesh(&mut mesh, &name, &Place::Line(1), warnings)?;
+        finish_mesh(&mut mesh, &name, &Place::Whole, warnings)?;
         scene.objects.push(Object {
             name,
             mesh: MeshId(scene.meshes.len() as u32),

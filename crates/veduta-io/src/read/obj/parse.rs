@@ -60,7 +60,8 @@ const MOST_CORNERS: usize = 65_536;
 /// object and are charged to the budget.
 pub fn parse(bytes: &[u8], budget: &mut Budget, warnings: &mut Warnings) -> Result<Parsed, Fault> {
     let mut parser = Parser::new(budget);
-    let mut rest = bytes;
+    // Some editors leave a byte order mark.
+    let mut rest = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut number = 0;
     while !rest.is_empty() {
         number += 1;
@@ -288,9 +289,12 @@ impl Parser<'_> {
             None => Err(wrong_token(token, EXPECTED)),
         };
         let position = reference("vertex", parsed.positions.len())?;
+        if position == NONE {
+            return Err(wrong_token(token, EXPECTED));
+        }
         let texcoord = reference("texture coordinate", parsed.texcoords.len())?;
         let normal = reference("normal", parsed.normals.len())?;
-        if position == NONE || rest.is_some() {
+        if rest.is_some() {
             return Err(wrong_token(token, EXPECTED));
         }
         Ok(Corner {
@@ -594,7 +598,7 @@ mod tests {
             cut("7/2/3"),
             ([Some(Some(7)), Some(Some(2)), Some(Some(3))], true)
         );
-        assert_eq!(cut("7/2/3/4").1, false);
+        assert!(!cut("7/2/3/4").1);
         for text in ["x", "-", "7/x", "7/-", "1.5", "99999999999999999999/a"] {
             assert!(cut(text).0.contains(&None), "{text}");
         }
