@@ -78,7 +78,7 @@ impl Scene {
         }
     }
 
-    /// A scene of some 5 to 200 faces.
+    /// A scene of some 5 to 150 faces; a few kinds make more of them.
     pub fn small(seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let (kind, draw) = KINDS[rng.integer(0, KINDS.len() as u32 - 1) as usize];
@@ -87,7 +87,7 @@ impl Scene {
         } else {
             (rng.integer(24, 64), rng.integer(16, 48))
         };
-        let faces = rng.magnitude(5.0, 200.0) as u32;
+        let faces = rng.magnitude(5.0, 150.0) as u32;
         Self::draw(seed, kind, draw, [width, height], faces, rng)
     }
 
@@ -398,7 +398,7 @@ fn cells_of(columns: u32, rows: u32) -> impl Iterator<Item = [usize; 4]> {
 
 /// Rectangles and triangles with vertices on corners and middles of pixels.
 fn pixel_corners(canvas: &mut Canvas, count: u32) {
-    for _ in 0..count {
+    for _ in 0..count.min(60) {
         let step = if canvas.rng.chance(0.7) { 1.0 } else { 0.5 };
         let mut corner = || (canvas.point() / step).round() * step;
         let (p, q, r) = (corner(), corner(), corner());
@@ -449,7 +449,8 @@ fn coplanar(canvas: &mut Canvas, count: u32) {
         let turn = if canvas.rng.chance(0.3) {
             DVec2::X
         } else {
-            0.7 * canvas.direction()
+            // All of it stays inside the frame.
+            canvas.direction() * (canvas.size().min_element() / canvas.size().length())
         };
         let points: Vec<DVec2> = points
             .iter()

@@ -12,8 +12,10 @@ use veduta_map::{FaceId, Faces, Fragments, Side};
 /// and so do pieces one above the other: V-scanlines and the edges of hidden faces leave no trace.
 #[derive(Default)]
 pub(super) struct Layer {
-    /// What has been seen between the last two cuts in x.
+    /// What has been seen of a cluster between two V-scanlines.
     column: Vec<Piece>,
+    /// What is being folded.
+    folded: Vec<Piece>,
     /// Pieces that may go on at their right end.
     open: Vec<Piece>,
     closed: Vec<Piece>,
@@ -31,14 +33,14 @@ impl Layer {
         self.open.push(piece);
     }
 
-    /// Adds a piece to the column; within it pieces come from top to bottom.
+    /// Adds a piece to the column; between the same cuts in x, pieces come from top to bottom.
     pub fn stack(&mut self, piece: Piece) {
         let shape = piece.shape;
         let above = self.column.iter_mut().rfind(|above| {
             above.face == piece.face
                 && above.shape.left == shape.left
                 && above.shape.right == shape.right
-                && above.shape.bottom == shape.top
+                && is_same_y(above.shape.bottom, shape.top)
         });
         match above {
             Some(above) => {
@@ -49,20 +51,28 @@ impl Layer {
         }
     }
 
+    /// How much is in the column.
+    pub fn mark(&self) -> usize {
+        self.column.len()
+    }
+
+    /// Joins what the column has got since `mark`, where it has been cut in x, and stacks it anew: a
+    /// face may not have noticed the crossing of edges behind it.
+    pub fn fold(&mut self, mark: usize) {
+        let mut folded = std::mem::take(&mut self.folded);
+        for piece in self.column.drain(mark..) {
+            append(&mut folded, piece);
+        }
+        for piece in folded.drain(..) {
+            self.stack(piece);
+        }
+        self.folded = folded;
+    }
+
     /// Joins the column's pieces with those that they continue.
     pub fn join(&mut self) {
         for piece in self.column.drain(..) {
-            let shape = piece.shape;
-            let before = self.open.iter_mut().rfind(|before| {
-                before.is_between(piece.face, shape.left, shape.above, shape.below)
-            });
-            let joined = before.and_then(|before| {
-                before.shape = before.shape.joined(&shape)?;
-                Some(())
-            });
-            if joined.is_none() {
-                self.open.push(piece);
-            }
+            append(&mut self.open, piece);
         }
     }
 
@@ -83,29 +93,35 @@ impl Layer {
         Some(self.open.swap_remove(place).shape)
     }
 
-    /// Nothing more comes between the first of `ends`, neighbouring V-scanlines, and `x`.
-    pub fn close_between(&mut self, ends: [f64; 2], x: f64) {
-        self.close_unless(|right| right <= ends[0] || right == x || right >= ends[1]);
-    }
-
     /// Nothing more comes left of `x`.
     pub fn close(&mut self, x: f64) {
-        self.close_unless(|right| right == x);
-    }
-
-    fn close_unless(&mut self, stays_open: impl Fn(f64) -> bool) {
         let closed = &mut self.closed;
         self.open.retain(|piece| {
-            let stays = stays_open(piece.shape.right);
-            if !stays {
+            let stays_open = piece.shape.right == x;
+            if !stays_open {
                 closed.push(*piece);
             }
-            stays
+            stays_open
         });
     }
 
     pub fn closed(&self) -> &[Piece] {
         &self.closed
+    }
+}
+
+/// Adds a piece to others, one of which it may continue.
+fn append(pieces: &mut Vec<Piece>, piece: Piece) {
+    let shape = piece.shape;
+    let before = pieces
+        .iter_mut()
+        .rfind(|before| before.is_between(piece.face, shape.left, shape.above, shape.below));
+    let joined = before.and_then(|before| {
+        before.shape = before.shape.joined(&shape)?;
+        Some(())
+    });
+    if joined.is_none() {
+        pieces.push(piece);
     }
 }
 
