@@ -1,6 +1,7 @@
 //! Pieces become fragments: joined across V-scanlines, their sides named, sorted by face.
 
 use super::h_scan::{EdgeOnScanline, Entering, Slice, Strip};
+use super::order::{behind, may_end_at};
 use super::{Bound, Piece, StripSeen, Trapezoid, is_same_y};
 use crate::visibility::Seen;
 use veduta_geometry::{DVec2, signed_area};
@@ -257,12 +258,17 @@ struct Naming<'a> {
 impl Naming<'_> {
     fn bound(&self, bound: Bound, ends: [DVec2; 2]) -> Side {
         let face = self.piece.face;
+        let middle = 0.5 * (ends[0] + ends[1]);
+        // Of several faces on one plane another may have been compared.
+        let is_own = |other: FaceId| {
+            other == face || self.faces.face_nearness(other) == self.faces.face_nearness(face)
+        };
         match bound {
-            Bound::Edge(edge_of, index) if self.may_end_at(edge_of, 0.5 * (ends[0] + ends[1])) => {
-                Side::of_outline(edge_of, index as usize)
+            Bound::Edge(other, index) if may_end_at(self.faces, face, other, middle) => {
+                Side::of_outline(other, index as usize)
             }
-            Bound::Crossing(one, other) if one == face => Side::crossing(other),
-            Bound::Crossing(one, other) if other == face => Side::crossing(one),
+            Bound::Crossing(one, other) if is_own(one) => Side::crossing(other),
+            Bound::Crossing(one, other) if is_own(other) => Side::crossing(one),
             // Something behind this face was cut here, and so was this face.
             _ => Side::scan(face),
         }
@@ -288,14 +294,17 @@ impl Naming<'_> {
         };
         let [start, end] = ends.map(along);
         let (low, high) = (start.min(end), start.max(end));
-        let mut candidates: Vec<&EdgeOnScanline> = edges
+        let mut candidates: Vec<EdgeOnScanline> = edges
             .iter()
             .filter(|edge| edge.at == at && edge.from < high && edge.to > low)
+            .filter_map(|edge| {
+                let stretch = [edge.from.max(low), edge.to.min(high)];
+                let behind = stretch
+                    .map(|along| behind(self.faces, self.piece.face, edge.side.face, point(along)));
+                let [from, to] = where_not_positive(stretch, behind)?;
+                Some(EdgeOnScanline { from, to, ..*edge })
+            })
             .collect();
-        candidates.retain(|edge| {
-            let middle = 0.5 * (edge.from.max(low) + edge.to.min(high));
-            self.may_end_at(edge.side.face, point(middle))
-        });
         if candidates.is_empty() {
             corners.push((ends[0], Side::scan(self.piece.face)));
             return;
@@ -327,31 +336,16 @@ impl Naming<'_> {
             corners.extend(sides.iter().map(|&(from, _, side)| (point(from), side)));
         }
     }
+}
 
-    /// Whether an edge of `other` may be where this piece's face stops being seen: it is the face's
-    /// own, or one of an opaque face that is not behind. Touching faces are given the benefit of the
-    /// doubt, since both names are of the same line.
-    fn may_end_at(&self, other: FaceId, point: DVec2) -> bool {
-        /// Relative to the planes' coefficients. Larger would name edges of hidden faces; smaller
-        /// would leave edges of touching faces without a name.
-        const TOUCHING: f64 = 1e-12;
-        let face = self.piece.face;
-        if other == face {
-            return true;
-        }
-        if self.faces.is_veil(other) {
-            return false;
-        }
-        if self.faces.plane(face) == self.faces.plane(other) {
-            return other < face;
-        }
-        let (own, its) = (
-            self.faces.face_nearness(face),
-            self.faces.face_nearness(other),
-        );
-        let scale =
-            own.a.abs() + own.b.abs() + own.c.abs() + its.a.abs() + its.b.abs() + its.c.abs();
-        own.minus(its).at(point) <= TOUCHING * scale
+/// The part of a stretch in which an affine function is not positive, given its values at the ends.
+fn where_not_positive([from, to]: [f64; 2], values: [f64; 2]) -> Option<[f64; 2]> {
+    let zero = || from + (to - from) * (values[0] / (values[0] - values[1]));
+    match values.map(|value| value <= 0.0) {
+        [true, true] => Some([from, to]),
+        [true, false] => Some([from, zero()]),
+        [false, true] => Some([zero(), to]),
+        [false, false] => None,
     }
 }
 

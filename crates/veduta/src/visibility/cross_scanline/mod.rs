@@ -19,6 +19,7 @@
 //! 2. `v_scan`: the sweep in x, which leaves a slice alone as long as no other overlaps it (3-1);
 //! 3. `split`: overlapping slices are cut where edges cross (3-2) and where planes do (§4, virtual
 //!    edges), and the nearest face is found;
+//!    `order` says which of two faces that is;
 //! 4. `emit`: trapezoids become fragments whose sides are named (3-3 needs no more than that: area
 //!    is left to the map's readers).
 //!
@@ -33,6 +34,7 @@
 
 mod emit;
 mod h_scan;
+mod order;
 mod split;
 mod v_scan;
 

@@ -21,9 +21,10 @@
 
 use super::emit::Layer;
 use super::h_scan::Slice;
-use super::{Bound, Piece, ROUNDING, Trapezoid, between, both_between, is_same_y};
+use super::order::{Difference, may_end_at};
+use super::{Bound, Piece, ROUNDING, Trapezoid, between, both_between};
 use std::ops::Range;
-use veduta_geometry::{Affine, DVec2};
+use veduta_geometry::DVec2;
 use veduta_map::{FaceId, Faces};
 
 /// A slice of a cluster, with its bounds' y at the two V-scanlines.
@@ -123,7 +124,7 @@ impl Splitter {
         &mut self,
         found: &mut Found,
         run: Range<usize>,
-        around: [Option<MemberBound>; 2],
+        around: [Option<usize>; 2],
         [mut left, right]: [f64; 2],
     ) {
         let first_pieces = [found.opaque.mark(), found.veils.mark()];
@@ -141,7 +142,6 @@ impl Splitter {
                 is_cut = true;
                 continue;
             }
-            let around = around.map(|bound| bound.map(|bound| self.evaluated(bound, left, right)));
             self.from_top_to_bottom(found, run.clone(), around, [left, right], all_cross);
             left = right;
             self.cuts.pop();
@@ -156,29 +156,25 @@ impl Splitter {
         }
     }
 
-    /// The bound between `left` and `right`.
-    fn evaluated(&self, bound: MemberBound, left: f64, right: f64) -> MemberBound {
+    /// Bound `index` between `left` and `right`, which lie between the V-scanlines.
+    fn evaluated(&self, index: usize, [left, right]: [f64; 2]) -> MemberBound {
+        let bound = self.bounds[index];
         let member = &self.members[bound.member as usize];
         let y = if bound.is_lower {
             member.bottom
         } else {
             member.top
         };
-        let y = self.part_of(y, left, right);
-        MemberBound { y, ..bound }
-    }
-
-    /// The part between `left` and `right` of a line with these `y` at the V-scanlines.
-    fn part_of(&self, y: [f64; 2], left: f64, right: f64) -> [f64; 2] {
         let width = self.ends[1] - self.ends[0];
-        both_between(y, [left, right].map(|x| (x - self.ends[0]) / width))
+        let y = both_between(y, [left, right].map(|x| (x - self.ends[0]) / width));
+        MemberBound { y, ..bound }
     }
 
     /// Evaluates the bounds `run` at `left` and `right`, sorts them by the middle, and notes how far
     /// up those further down reach.
     fn sort_bounds(&mut self, run: Range<usize>, left: f64, right: f64) {
         for index in run.clone() {
-            self.bounds[index] = self.evaluated(self.bounds[index], left, right);
+            self.bounds[index] = self.evaluated(index, [left, right]);
         }
         // Stable, and quick where the order has hardly changed since the last part.
         self.bounds[run.clone()].sort_by(|bound, other| bound.middle().total_cmp(&other.middle()));
@@ -201,7 +197,7 @@ impl Splitter {
                     || self.reach[next][1] < lowest[1] - ROUNDING)
             {
                 let y = self.bounds[next].y;
-                lowest = [lowest[0].max(y[0]), lowest[1].max(y[1])];
+                lowest = lower_of(lowest, y);
                 next += 1;
             }
             if next == straight + 1 {
@@ -239,10 +235,12 @@ impl Splitter {
         &mut self,
         found: &mut Found,
         run: Range<usize>,
-        [mut above, below]: [Option<MemberBound>; 2],
+        [above, below]: [Option<usize>; 2],
         ends: [f64; 2],
         in_order: bool,
     ) {
+        // The last bound's place, and its y, moved down where rounding has put it above others.
+        let mut above = above.map(|above| (above, self.evaluated(above, ends).y));
         let mut index = run.start;
         while index < run.end {
             let straight = if in_order {
@@ -251,23 +249,25 @@ impl Splitter {
                 self.end_of_crossings(index, run.end)
             };
             let next = if straight < run.end {
-                Some(self.bounds[straight])
+                Some(straight)
             } else {
                 below
             };
             if straight > index {
-                self.zone(found, index..straight, [above, next], ends);
+                let around = [above.map(|(place, _)| place), next];
+                self.zone(found, index..straight, around, ends);
             } else {
-                self.between_bounds(found, [above, next], ends);
+                self.between_bounds(found, above, next, ends);
             }
             if straight == run.end {
                 return;
             }
             self.toggle(found, straight);
-            above = Some(not_above(self.bounds[straight], above));
+            let y = self.bounds[straight].y;
+            above = Some((straight, above.map_or(y, |(_, above)| lower_of(y, above))));
             index = straight + 1;
         }
-        self.between_bounds(found, [above, below], ends);
+        self.between_bounds(found, above, below, ends);
     }
 
     /// At a member's first bound it enters the cover, at the second it leaves. Which of them is the
@@ -288,27 +288,31 @@ impl Splitter {
     fn between_bounds(
         &mut self,
         found: &mut Found,
-        bounds: [Option<MemberBound>; 2],
-        [left, right]: [f64; 2],
+        above: Option<(usize, [f64; 2])>,
+        below: Option<usize>,
+        ends: [f64; 2],
     ) {
-        let [Some(above), Some(below)] = bounds else {
+        let (Some((above, top)), Some(below)) = (above, below) else {
             return;
         };
+        if self.cover.is_empty() {
+            return;
+        }
         let shape = Trapezoid {
-            left,
-            right,
-            top: above.y,
-            bottom: not_above(below, Some(above)).y,
-            above: self.name(found, above),
-            below: self.name(found, below),
+            left: ends[0],
+            right: ends[1],
+            top,
+            bottom: lower_of(self.evaluated(below, ends).y, top),
+            above: self.name(found, &self.bounds[above]),
+            below: self.name(found, &self.bounds[below]),
         };
-        if !self.cover.is_empty() && !shape.is_flat() {
-            self.see(found, shape);
+        if !shape.is_flat() {
+            self.see(found, shape, [above, below]);
         }
     }
 
     /// What makes a bound.
-    fn name(&self, found: &Found, bound: MemberBound) -> Bound {
+    fn name(&self, found: &Found, bound: &MemberBound) -> Bound {
         let slice = &found.slices[self.members[bound.member as usize].slice as usize];
         if bound.is_lower {
             slice.bottom.bound
@@ -317,8 +321,9 @@ impl Splitter {
         }
     }
 
-    /// Finds what is seen in the trapezoid `shape`, which every face of the cover covers.
-    fn see(&mut self, found: &mut Found, shape: Trapezoid) {
+    /// Finds what is seen in the trapezoid `shape`, which lies between two `bounds` and which every
+    /// face of the cover covers.
+    fn see(&mut self, found: &mut Found, shape: Trapezoid, bounds: [usize; 2]) {
         let faces = found.faces;
         self.sort_cover(faces, &shape);
         self.nearest.clear();
@@ -326,7 +331,7 @@ impl Splitter {
             nearest(faces, shape, first, rest, &mut self.nearest);
         }
         for &(covering, part) in &self.nearest {
-            let piece = self.piece(found, covering, &shape, part);
+            let piece = self.piece(found, covering, &shape, bounds, part);
             found.opaque.stack(piece);
         }
         // What rounding may have hidden does not keep a face from being seen whole.
@@ -339,7 +344,7 @@ impl Splitter {
         }
         for &veil in &self.veils {
             if self.nearest.is_empty() {
-                let piece = self.piece(found, veil, &shape, shape);
+                let piece = self.piece(found, veil, &shape, bounds, shape);
                 found.veils.stack(piece);
             }
             for &(front, part) in &self.nearest {
@@ -348,7 +353,7 @@ impl Splitter {
                     self.hide(found, veil);
                 }
                 order.for_each_front(part, |part| {
-                    let piece = self.piece(found, veil, &shape, part);
+                    let piece = self.piece(found, veil, &shape, bounds, part);
                     found.veils.stack(piece);
                 });
             }
@@ -371,7 +376,7 @@ impl Splitter {
             }
             self.opaque.push(covering);
             let last = self.opaque.len() - 1;
-            if is_in_front(faces, covering.face, self.opaque[0].face, middle) {
+            if Difference::of(faces, covering.face, self.opaque[0].face).is_in_front(middle) {
                 self.opaque.swap(0, last);
             }
         }
@@ -381,41 +386,72 @@ impl Splitter {
         found.hidden[self.members[covering.member as usize].slice as usize] = true;
     }
 
-    /// What is seen of a face in `part` of the trapezoid `shape`. A face prefers its own name for a
-    /// bound that it shares with others.
+    /// What is seen of a face in `part` of the trapezoid `shape`, which lies between two `bounds`.
     fn piece(
         &self,
         found: &Found,
         covering: Covering,
         shape: &Trapezoid,
+        [above, below]: [usize; 2],
         part: Trapezoid,
     ) -> Piece {
-        let member = &self.members[covering.member as usize];
-        let slice = &found.slices[member.slice as usize];
-        let is_own =
-            |y: [f64; 2], own: [f64; 2]| is_same_y(y, self.part_of(own, shape.left, shape.right));
         let mut piece = Piece {
             face: covering.face,
             shape: part,
         };
-        if part.above == shape.above && is_own(shape.top, member.top) {
-            piece.shape.above = slice.top.bound;
+        // The others are virtual edges.
+        if part.above == shape.above {
+            piece.shape.above = self.best_name(found, covering, above, &part, part.top);
         }
-        if part.below == shape.below && is_own(shape.bottom, member.bottom) {
-            piece.shape.below = slice.bottom.bound;
+        if part.below == shape.below {
+            piece.shape.below = self.best_name(found, covering, below, &part, part.bottom);
         }
         piece
     }
+
+    /// The name of bound `index`, where `y` is, for the face of `covering`: of the bounds that are
+    /// there, one of the face's own if there is one, or else one of a face in front of it.
+    fn best_name(
+        &self,
+        found: &Found,
+        covering: Covering,
+        index: usize,
+        part: &Trapezoid,
+        y: [f64; 2],
+    ) -> Bound {
+        let ends = [part.left, part.right];
+        let middle = DVec2::new(0.5 * (part.left + part.right), 0.5 * (y[0] + y[1]));
+        let is_there = |&other: &usize| {
+            let its = self.evaluated(other, ends).y;
+            (y[0] - its[0]).abs() <= COINCIDENT && (y[1] - its[1]).abs() <= COINCIDENT
+        };
+        let name = |other: usize| self.name(found, &self.bounds[other]);
+        let mut in_front = None;
+        let before = (0..=index).rev().take_while(is_there);
+        let after = (index + 1..self.bounds.len()).take_while(is_there);
+        for other in before.chain(after) {
+            if self.bounds[other].member == covering.member {
+                return name(other);
+            }
+            if let Bound::Edge(face, _) = name(other)
+                && in_front.is_none()
+                && may_end_at(found.faces, covering.face, face, middle)
+            {
+                in_front = Some(other);
+            }
+        }
+        name(in_front.unwrap_or(index))
+    }
 }
 
-/// `bound`, moved down to where `above` is if rounding has put it higher, so that there is neither
-/// gap nor overlap.
-fn not_above(bound: MemberBound, above: Option<MemberBound>) -> MemberBound {
-    let Some(above) = above else {
-        return bound;
-    };
-    let y = [bound.y[0].max(above.y[0]), bound.y[1].max(above.y[1])];
-    MemberBound { y, ..bound }
+/// Bounds closer than this have one place as far as their names go. Larger than the rounding of
+/// vertices in the middle of steep edges, and far smaller than the thinnest sliver; areas do not
+/// depend on it.
+const COINCIDENT: f64 = 1e-12;
+
+/// The lower of two bounds, at either end.
+fn lower_of(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].max(other[0]), one[1].max(other[1])]
 }
 
 /// Finds the nearest of `front` and `others` in `shape`, in parts where there is not one alone.
@@ -485,43 +521,12 @@ impl Parts {
     }
 }
 
-/// The difference of two faces' nearness, or which is in front everywhere.
-enum Difference {
-    Everywhere(Order),
-    Affine(Affine),
-}
-
-fn difference(faces: &Faces, first: FaceId, second: FaceId) -> Difference {
-    let by_id = || {
-        Difference::Everywhere(if first < second {
-            Order::Front
-        } else {
-            Order::Behind
-        })
-    };
-    let (plane, other) = (faces.plane(first), faces.plane(second));
-    if plane == other {
-        return by_id();
-    }
-    let difference = faces.nearness(plane).minus(faces.nearness(other));
-    if difference == Affine::default() {
-        return by_id();
-    }
-    Difference::Affine(difference)
-}
-
-fn is_in_front(faces: &Faces, first: FaceId, second: FaceId, point: DVec2) -> bool {
-    match difference(faces, first, second) {
-        Difference::Everywhere(order) => matches!(order, Order::Front),
-        Difference::Affine(difference) => difference.at(point) > 0.0,
-    }
-}
-
 /// Which of two faces is in front in `shape`, where both are.
 fn compare(faces: &Faces, first: FaceId, second: FaceId, shape: &Trapezoid) -> Order {
-    let difference = match difference(faces, first, second) {
-        Difference::Everywhere(order) => return order,
+    let difference = match Difference::of(faces, first, second) {
         Difference::Affine(difference) => difference,
+        Difference::FirstInFront => return Order::Front,
+        Difference::SecondInFront => return Order::Behind,
     };
     let at_corners = |y: [f64; 2]| {
         [
