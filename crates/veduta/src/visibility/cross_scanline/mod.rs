@@ -69,6 +69,11 @@ impl Default for Settings {
 /// which at 4,096 pixels is 4e-12 of a pixel's area.
 const ROUNDING: f64 = 1e-15;
 
+/// Lines closer than this have one place as far as their names go, so that sides along which several
+/// edges lie are named after the right one. Larger than the rounding of vertices in the middle of
+/// steep edges, far smaller than the thinnest sliver; areas do not depend on it.
+const COINCIDENT: f64 = 1e-12;
+
 /// Finds what is seen of `faces`: the exact regions in which each face is.
 ///
 /// Faces none of whose slices is hidden are reported whole, the others as trapezoids and triangles.

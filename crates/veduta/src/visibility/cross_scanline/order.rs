@@ -42,14 +42,10 @@ impl Difference {
 /// edges of faces that touch without a name.
 const TOUCHING: f64 = 1e-12;
 
-/// Whether an edge of `other` may be where `face` stops being seen at `point`: it is the face's own,
-/// or that of an opaque face not behind it.
-pub(super) fn may_end_at(faces: &Faces, face: FaceId, other: FaceId, point: DVec2) -> bool {
-    behind(faces, face, other, point) <= 0.0
-}
-
-/// How far `other` is behind `face` at `point`: an affine function of the point, in some unit, that is
-/// positive where an edge of `other` cannot be where `face` stops being seen.
+/// How far `other` is behind `face` at `point`, an affine function of the point in some unit.
+///
+/// Where it is positive an edge of `other` cannot be where `face` stops being seen. It is never so for
+/// the face's own edges, and always for those of veils, which hide nothing.
 pub(super) fn behind(faces: &Faces, face: FaceId, other: FaceId, point: DVec2) -> f64 {
     if other == face {
         return -1.0;

@@ -21,8 +21,8 @@
 
 use super::emit::Layer;
 use super::h_scan::Slice;
-use super::order::{Difference, may_end_at};
-use super::{Bound, Piece, ROUNDING, Trapezoid, between, both_between};
+use super::order::Difference;
+use super::{Bound, COINCIDENT, Piece, ROUNDING, Trapezoid, between, both_between};
 use std::ops::Range;
 use veduta_geometry::DVec2;
 use veduta_map::{FaceId, Faces};
@@ -156,8 +156,8 @@ impl Splitter {
         }
     }
 
-    /// Bound `index` between `left` and `right`, which lie between the V-scanlines.
-    fn evaluated(&self, index: usize, [left, right]: [f64; 2]) -> MemberBound {
+    /// Bound `index` between two `ends`, which lie between the V-scanlines.
+    fn evaluated(&self, index: usize, ends: [f64; 2]) -> MemberBound {
         let bound = self.bounds[index];
         let member = &self.members[bound.member as usize];
         let y = if bound.is_lower {
@@ -165,9 +165,14 @@ impl Splitter {
         } else {
             member.top
         };
-        let width = self.ends[1] - self.ends[0];
-        let y = both_between(y, [left, right].map(|x| (x - self.ends[0]) / width));
+        let y = self.part_of(y, ends);
         MemberBound { y, ..bound }
+    }
+
+    /// The part between the two `ends` of a line with these `y` at the V-scanlines.
+    fn part_of(&self, y: [f64; 2], ends: [f64; 2]) -> [f64; 2] {
+        let width = self.ends[1] - self.ends[0];
+        both_between(y, ends.map(|x| (x - self.ends[0]) / width))
     }
 
     /// Evaluates the bounds `run` at `left` and `right`, sorts them by the middle, and notes how far
@@ -307,7 +312,7 @@ impl Splitter {
             below: self.name(found, &self.bounds[below]),
         };
         if !shape.is_flat() {
-            self.see(found, shape, [above, below]);
+            self.see(found, shape);
         }
     }
 
@@ -321,9 +326,8 @@ impl Splitter {
         }
     }
 
-    /// Finds what is seen in the trapezoid `shape`, which lies between two `bounds` and which every
-    /// face of the cover covers.
-    fn see(&mut self, found: &mut Found, shape: Trapezoid, bounds: [usize; 2]) {
+    /// Finds what is seen in the trapezoid `shape`, which every face of the cover covers.
+    fn see(&mut self, found: &mut Found, shape: Trapezoid) {
         let faces = found.faces;
         self.sort_cover(faces, &shape);
         self.nearest.clear();
@@ -331,7 +335,7 @@ impl Splitter {
             nearest(faces, shape, first, rest, &mut self.nearest);
         }
         for &(covering, part) in &self.nearest {
-            let piece = self.piece(found, covering, &shape, bounds, part);
+            let piece = self.piece(found, covering, &shape, part);
             found.opaque.stack(piece);
         }
         // What rounding may have hidden does not keep a face from being seen whole.
@@ -344,7 +348,7 @@ impl Splitter {
         }
         for &veil in &self.veils {
             if self.nearest.is_empty() {
-                let piece = self.piece(found, veil, &shape, bounds, shape);
+                let piece = self.piece(found, veil, &shape, shape);
                 found.veils.stack(piece);
             }
             for &(front, part) in &self.nearest {
@@ -353,7 +357,7 @@ impl Splitter {
                     self.hide(found, veil);
                 }
                 order.for_each_front(part, |part| {
-                    let piece = self.piece(found, veil, &shape, bounds, part);
+                    let piece = self.piece(found, veil, &shape, part);
                     found.veils.stack(piece);
                 });
             }
@@ -386,68 +390,35 @@ impl Splitter {
         found.hidden[self.members[covering.member as usize].slice as usize] = true;
     }
 
-    /// What is seen of a face in `part` of the trapezoid `shape`, which lies between two `bounds`.
+    /// What is seen of a face in `part` of the trapezoid `shape`. A face prefers its own name for a
+    /// bound that it shares with others.
     fn piece(
         &self,
         found: &Found,
         covering: Covering,
         shape: &Trapezoid,
-        [above, below]: [usize; 2],
         part: Trapezoid,
     ) -> Piece {
+        let member = &self.members[covering.member as usize];
+        let slice = &found.slices[member.slice as usize];
+        let is_own = |y: [f64; 2], own: [f64; 2]| {
+            let own = self.part_of(own, [shape.left, shape.right]);
+            (y[0] - own[0]).abs() <= COINCIDENT && (y[1] - own[1]).abs() <= COINCIDENT
+        };
         let mut piece = Piece {
             face: covering.face,
             shape: part,
         };
-        // The others are virtual edges.
-        if part.above == shape.above {
-            piece.shape.above = self.best_name(found, covering, above, &part, part.top);
+        // Other bounds of the part are virtual edges.
+        if part.above == shape.above && is_own(shape.top, member.top) {
+            piece.shape.above = slice.top.bound;
         }
-        if part.below == shape.below {
-            piece.shape.below = self.best_name(found, covering, below, &part, part.bottom);
+        if part.below == shape.below && is_own(shape.bottom, member.bottom) {
+            piece.shape.below = slice.bottom.bound;
         }
         piece
     }
-
-    /// The name of bound `index`, where `y` is, for the face of `covering`: of the bounds that are
-    /// there, one of the face's own if there is one, or else one of a face in front of it.
-    fn best_name(
-        &self,
-        found: &Found,
-        covering: Covering,
-        index: usize,
-        part: &Trapezoid,
-        y: [f64; 2],
-    ) -> Bound {
-        let ends = [part.left, part.right];
-        let middle = DVec2::new(0.5 * (part.left + part.right), 0.5 * (y[0] + y[1]));
-        let is_there = |&other: &usize| {
-            let its = self.evaluated(other, ends).y;
-            (y[0] - its[0]).abs() <= COINCIDENT && (y[1] - its[1]).abs() <= COINCIDENT
-        };
-        let name = |other: usize| self.name(found, &self.bounds[other]);
-        let mut in_front = None;
-        let before = (0..=index).rev().take_while(is_there);
-        let after = (index + 1..self.bounds.len()).take_while(is_there);
-        for other in before.chain(after) {
-            if self.bounds[other].member == covering.member {
-                return name(other);
-            }
-            if let Bound::Edge(face, _) = name(other)
-                && in_front.is_none()
-                && may_end_at(found.faces, covering.face, face, middle)
-            {
-                in_front = Some(other);
-            }
-        }
-        name(in_front.unwrap_or(index))
-    }
 }
-
-/// Bounds closer than this have one place as far as their names go. Larger than the rounding of
-/// vertices in the middle of steep edges, and far smaller than the thinnest sliver; areas do not
-/// depend on it.
-const COINCIDENT: f64 = 1e-12;
 
 /// The lower of two bounds, at either end.
 fn lower_of(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
