@@ -39,7 +39,7 @@ const ENGINES: [Engine; 3] = [
     Engine {
         name: "sweep, 53 strips",
         find: |scene| sweep(&scene.faces, 53),
-        one_in: [4, 4],
+        one_in: [4, 8],
     },
 ];
 

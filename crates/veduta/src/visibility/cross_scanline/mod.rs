@@ -177,3 +177,6 @@ fn both_between(ends: [f64; 2], along: [f64; 2]) -> [f64; 2] {
 fn is_same_y(one: [f64; 2], other: [f64; 2]) -> bool {
     (one[0] - other[0]).abs() <= ROUNDING && (one[1] - other[1]).abs() <= ROUNDING
 }
+
+#[cfg(test)]
+mod tests;
