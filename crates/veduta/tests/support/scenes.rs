@@ -78,7 +78,7 @@ impl Scene {
         }
     }
 
-    /// A scene of some 5 to 200 faces.
+    /// A scene of some 5 to 150 faces; a few kinds make more of them.
     pub fn small(seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let (kind, draw) = KINDS[rng.integer(0, KINDS.len() as u32 - 1) as usize];
@@ -87,7 +87,7 @@ impl Scene {
         } else {
             (rng.integer(24, 64), rng.integer(16, 48))
         };
-        let faces = rng.magnitude(5.0, 200.0) as u32;
+        let faces = rng.magnitude(5.0, 150.0) as u32;
         Self::draw(seed, kind, draw, [width, height], faces, rng)
     }
 
@@ -95,7 +95,7 @@ impl Scene {
     pub fn large(seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let (kind, draw) = LARGE_KINDS[rng.integer(0, LARGE_KINDS.len() as u32 - 1) as usize];
-        let size = [rng.integer(12, 24), rng.integer(40, 56)];
+        let size = [rng.integer(20, 32), rng.integer(44, 60)];
         let faces = rng.integer(5_200, 6_000);
         let scene = Self::draw(seed, kind, draw, size, faces, rng);
         assert!(scene.faces.len() > LARGE, "{scene} should have more faces");
@@ -398,7 +398,7 @@ fn cells_of(columns: u32, rows: u32) -> impl Iterator<Item = [usize; 4]> {
 
 /// Rectangles and triangles with vertices on corners and middles of pixels.
 fn pixel_corners(canvas: &mut Canvas, count: u32) {
-    for _ in 0..count {
+    for _ in 0..count.min(60) {
         let step = if canvas.rng.chance(0.7) { 1.0 } else { 0.5 };
         let mut corner = || (canvas.point() / step).round() * step;
         let (p, q, r) = (corner(), corner(), corner());
@@ -449,7 +449,8 @@ fn coplanar(canvas: &mut Canvas, count: u32) {
         let turn = if canvas.rng.chance(0.3) {
             DVec2::X
         } else {
-            0.7 * canvas.direction()
+            // All of it stays inside the frame.
+            canvas.direction() * (canvas.size().min_element() / canvas.size().length())
         };
         let points: Vec<DVec2> = points
             .iter()
@@ -505,12 +506,9 @@ fn piercing(canvas: &mut Canvas, count: u32) {
     // Mostly inside the frame, so that there are as many faces as asked for.
     let size = canvas.width.min(canvas.height);
     for _ in 0..balls {
-        let offset = DVec2::new(
-            canvas.rng.within(-0.15, 0.15),
-            canvas.rng.within(-0.15, 0.15),
-        );
+        let offset = DVec2::new(canvas.rng.within(-0.1, 0.1), canvas.rng.within(-0.1, 0.1));
         let centre = canvas.size() * 0.5 + offset * size;
-        let radius = canvas.rng.within(0.2, 0.35) * size;
+        let radius = canvas.rng.within(0.25, 0.4) * size;
         let depth = canvas.rng.within(0.45, 0.55);
         canvas.ball(centre.extend(depth), radius, rings);
     }
@@ -539,7 +537,7 @@ fn wires(canvas: &mut Canvas, count: u32) {
 }
 
 fn short_wires(canvas: &mut Canvas, count: u32) {
-    wires_of_length(canvas, count, 0.05);
+    wires_of_length(canvas, count, 0.03);
 }
 
 fn wires_of_length(canvas: &mut Canvas, count: u32, length: f64) {
@@ -556,7 +554,7 @@ fn foliage(canvas: &mut Canvas, count: u32) {
     for _ in 0..count {
         let centre = canvas.point();
         let size =
-            canvas.rng.within(0.4, 1.2) * (canvas.width * canvas.height / f64::from(count)).sqrt();
+            canvas.rng.within(0.3, 0.9) * (canvas.width * canvas.height / f64::from(count)).sqrt();
         let depth = canvas.rng.within(0.2, 0.8);
         if canvas.rng.chance(0.5) {
             let plane = canvas.any_plane(0.5);

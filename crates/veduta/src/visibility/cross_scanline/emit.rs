@@ -1,7 +1,8 @@
 //! Pieces become fragments: joined across V-scanlines, their sides named, sorted by face.
 
 use super::h_scan::{EdgeOnScanline, Entering, Slice, Strip};
-use super::{Bound, Piece, StripSeen, Trapezoid, is_same_y};
+use super::order::behind;
+use super::{Bound, COINCIDENT, Piece, StripSeen, Trapezoid, is_same_y};
 use crate::visibility::Seen;
 use veduta_geometry::{DVec2, signed_area};
 use veduta_map::{FaceId, Faces, Fragments, Side};
@@ -12,8 +13,10 @@ use veduta_map::{FaceId, Faces, Fragments, Side};
 /// and so do pieces one above the other: V-scanlines and the edges of hidden faces leave no trace.
 #[derive(Default)]
 pub(super) struct Layer {
-    /// What has been seen between the last two cuts in x.
+    /// What has been seen of a cluster between two V-scanlines.
     column: Vec<Piece>,
+    /// What is being folded.
+    folded: Vec<Piece>,
     /// Pieces that may go on at their right end.
     open: Vec<Piece>,
     closed: Vec<Piece>,
@@ -31,14 +34,14 @@ impl Layer {
         self.open.push(piece);
     }
 
-    /// Adds a piece to the column; within it pieces come from top to bottom.
+    /// Adds a piece to the column; between the same cuts in x, pieces come from top to bottom.
     pub fn stack(&mut self, piece: Piece) {
         let shape = piece.shape;
         let above = self.column.iter_mut().rfind(|above| {
             above.face == piece.face
                 && above.shape.left == shape.left
                 && above.shape.right == shape.right
-                && above.shape.bottom == shape.top
+                && is_same_y(above.shape.bottom, shape.top)
         });
         match above {
             Some(above) => {
@@ -49,20 +52,28 @@ impl Layer {
         }
     }
 
+    /// How much is in the column.
+    pub fn mark(&self) -> usize {
+        self.column.len()
+    }
+
+    /// Joins what the column has got since `mark`, where it has been cut in x, and stacks it anew: a
+    /// face may not have noticed the crossing of edges behind it.
+    pub fn fold(&mut self, mark: usize) {
+        let mut folded = std::mem::take(&mut self.folded);
+        for piece in self.column.drain(mark..) {
+            append(&mut folded, piece);
+        }
+        for piece in folded.drain(..) {
+            self.stack(piece);
+        }
+        self.folded = folded;
+    }
+
     /// Joins the column's pieces with those that they continue.
     pub fn join(&mut self) {
         for piece in self.column.drain(..) {
-            let shape = piece.shape;
-            let before = self.open.iter_mut().rfind(|before| {
-                before.is_between(piece.face, shape.left, shape.above, shape.below)
-            });
-            let joined = before.and_then(|before| {
-                before.shape = before.shape.joined(&shape)?;
-                Some(())
-            });
-            if joined.is_none() {
-                self.open.push(piece);
-            }
+            append(&mut self.open, piece);
         }
     }
 
@@ -83,29 +94,35 @@ impl Layer {
         Some(self.open.swap_remove(place).shape)
     }
 
-    /// Nothing more comes between the first of `ends`, neighbouring V-scanlines, and `x`.
-    pub fn close_between(&mut self, ends: [f64; 2], x: f64) {
-        self.close_unless(|right| right <= ends[0] || right == x || right >= ends[1]);
-    }
-
     /// Nothing more comes left of `x`.
     pub fn close(&mut self, x: f64) {
-        self.close_unless(|right| right == x);
-    }
-
-    fn close_unless(&mut self, stays_open: impl Fn(f64) -> bool) {
         let closed = &mut self.closed;
         self.open.retain(|piece| {
-            let stays = stays_open(piece.shape.right);
-            if !stays {
+            let stays_open = piece.shape.right == x;
+            if !stays_open {
                 closed.push(*piece);
             }
-            stays
+            stays_open
         });
     }
 
     pub fn closed(&self) -> &[Piece] {
         &self.closed
+    }
+}
+
+/// Adds a piece to others, one of which it may continue.
+fn append(pieces: &mut Vec<Piece>, piece: Piece) {
+    let shape = piece.shape;
+    let before = pieces
+        .iter_mut()
+        .rfind(|before| before.is_between(piece.face, shape.left, shape.above, shape.below));
+    let joined = before.and_then(|before| {
+        before.shape = before.shape.joined(&shape)?;
+        Some(())
+    });
+    if joined.is_none() {
+        pieces.push(piece);
     }
 }
 
@@ -206,136 +223,201 @@ fn add_corners(
         above,
         below,
     } = piece.shape;
-    let naming = Naming { faces, piece };
+    let naming = Naming {
+        faces,
+        entering,
+        piece,
+    };
     let upper = [DVec2::new(left, top[0]), DVec2::new(right, top[1])];
     let lower = [DVec2::new(right, bottom[1]), DVec2::new(left, bottom[0])];
-    let at_x = |x: f64| {
-        let edges = &entering.vertical;
-        let start = edges.partition_point(|edge| edge.at < x);
-        let count = edges[start..].partition_point(|edge| edge.at == x);
-        &edges[start..start + count]
-    };
-
-    match above {
-        Bound::HScanline => naming.scanline(upper, strip.top, &entering.horizontal, corners),
-        bound => corners.push((upper[0], naming.bound(bound, upper))),
-    }
+    naming.bound(upper, above, strip.top, corners);
     if top[1] < bottom[1] {
-        naming.scanline([upper[1], lower[0]], right, at_x(right), corners);
+        naming.v_scanline([upper[1], lower[0]], corners);
     }
-    match below {
-        Bound::HScanline => naming.scanline(lower, strip.bottom, &entering.horizontal, corners),
-        bound => corners.push((lower[0], naming.bound(bound, lower))),
-    }
+    naming.bound(lower, below, strip.bottom, corners);
     if top[0] < bottom[0] {
-        naming.scanline([lower[1], upper[0]], left, at_x(left), corners);
+        naming.v_scanline([lower[1], upper[0]], corners);
     }
 }
 
 /// Names the sides of one piece.
+///
+/// A side is named after an edge that bounds the piece's face there: the face's own, or that of an
+/// opaque face not behind it. Several edges may lie along one side, and an edge may bound the face
+/// along a part of it only, because it ends or goes behind the face; then the side is divided.
 struct Naming<'a> {
     faces: &'a Faces,
+    entering: &'a Entering,
     piece: &'a Piece,
 }
 
+/// An edge along a side, between two positions along the side.
+#[derive(Clone, Copy)]
+struct EdgeAlong {
+    from: f64,
+    to: f64,
+    side: Side,
+}
+
 impl Naming<'_> {
-    fn bound(&self, bound: Bound, ends: [DVec2; 2]) -> Side {
+    /// Names the side from `ends[0]` to `ends[1]` along a bound; if that is an H-scanline, it is the
+    /// one at `h_scanline`.
+    fn bound(
+        &self,
+        ends: [DVec2; 2],
+        bound: Bound,
+        h_scanline: f64,
+        corners: &mut Vec<(DVec2, Side)>,
+    ) {
         let face = self.piece.face;
+        // Of several faces on one plane another may have been compared.
+        let is_own = |other: FaceId| {
+            other == face || self.faces.face_nearness(other) == self.faces.face_nearness(face)
+        };
         match bound {
-            Bound::Edge(edge_of, index) if self.may_end_at(edge_of, 0.5 * (ends[0] + ends[1])) => {
-                Side::of_outline(edge_of, index as usize)
+            Bound::HScanline => {
+                let edges = self.entering.horizontal.iter();
+                let is_here = |edge: &&EdgeOnScanline| is_coincident(edge.at, h_scanline);
+                self.divide(ends, edges.filter(is_here).map(EdgeAlong::from), corners);
             }
-            Bound::Crossing(one, other) if one == face => Side::crossing(other),
-            Bound::Crossing(one, other) if other == face => Side::crossing(one),
-            // Something behind this face was cut here, and so was this face.
-            _ => Side::scan(face),
+            Bound::Crossing(one, other) if is_own(one) => {
+                corners.push((ends[0], Side::crossing(other)));
+            }
+            Bound::Crossing(one, other) if is_own(other) => {
+                corners.push((ends[0], Side::crossing(one)));
+            }
+            // Faces behind this one cross here, and it was cut with them.
+            Bound::Crossing(..) => corners.push((ends[0], Side::scan(face))),
+            Bound::Edge(other, index) => {
+                if ends.map(|end| behind(self.faces, face, other, end) <= 0.0) == [true; 2] {
+                    corners.push((ends[0], Side::of_outline(other, index as usize)));
+                } else {
+                    self.divide(ends, self.edges_along(ends), corners);
+                }
+            }
         }
     }
 
-    /// Names the side from `ends[0]` to `ends[1]` along the scanline at `at`. Where edges lie on the
-    /// scanline it may have to be divided.
-    fn scanline(
+    /// Names the side from `ends[0]` to `ends[1]` along a V-scanline.
+    fn v_scanline(&self, ends: [DVec2; 2], corners: &mut Vec<(DVec2, Side)>) {
+        let edges = &self.entering.vertical;
+        let x = ends[0].x;
+        let start = edges.partition_point(|edge| edge.at < x - COINCIDENT);
+        let here = edges[start..]
+            .iter()
+            .take_while(|edge| is_coincident(edge.at, x));
+        self.divide(ends, here.map(EdgeAlong::from), corners);
+    }
+
+    /// All edges in the strip that lie along a side which is not vertical.
+    fn edges_along(&self, ends: [DVec2; 2]) -> impl Iterator<Item = EdgeAlong> {
+        let [start, end] = ends;
+        let (low, high) = (start.x.min(end.x), start.x.max(end.x));
+        let y = move |x: f64| start.y + (end.y - start.y) * ((x - start.x) / (end.x - start.x));
+        self.entering
+            .slices
+            .iter()
+            .filter(move |slice| slice.left < high && slice.right > low)
+            .flat_map(|slice| [(slice, slice.top), (slice, slice.bottom)])
+            .filter_map(move |(slice, line)| {
+                let Bound::Edge(face, index) = line.bound else {
+                    return None;
+                };
+                let (from, to) = (slice.left.max(low), slice.right.min(high));
+                let is_along = [from, to]
+                    .into_iter()
+                    .all(|x| is_coincident(line.at(x), y(x)));
+                let side = Side::of_outline(face, index as usize);
+                is_along.then_some(EdgeAlong { from, to, side })
+            })
+    }
+
+    /// Names the side from `ends[0]` to `ends[1]` after `edges`, in one or several parts.
+    fn divide(
         &self,
         ends: [DVec2; 2],
-        at: f64,
-        edges: &[EdgeOnScanline],
+        edges: impl Iterator<Item = EdgeAlong>,
         corners: &mut Vec<(DVec2, Side)>,
     ) {
         let is_vertical = ends[0].x == ends[1].x;
-        let along = |point: DVec2| if is_vertical { point.y } else { point.x };
+        let [start, end] = ends.map(|point| if is_vertical { point.y } else { point.x });
         let point = |along: f64| {
-            if is_vertical {
-                DVec2::new(ends[0].x, along)
+            if along == start {
+                ends[0]
+            } else if along == end {
+                ends[1]
             } else {
-                DVec2::new(along, ends[0].y)
+                ends[0].lerp(ends[1], (along - start) / (end - start))
             }
         };
-        let [start, end] = ends.map(along);
         let (low, high) = (start.min(end), start.max(end));
-        let mut candidates: Vec<&EdgeOnScanline> = edges
-            .iter()
-            .filter(|edge| edge.at == at && edge.from < high && edge.to > low)
+        let mut edges: Vec<EdgeAlong> = edges
+            .filter(|edge| edge.from < high && edge.to > low)
+            .filter_map(|edge| {
+                let stretch = [edge.from.max(low), edge.to.min(high)];
+                let behind = stretch
+                    .map(|along| behind(self.faces, self.piece.face, edge.side.face, point(along)));
+                let [from, to] = where_not_positive(stretch, behind)?;
+                Some(EdgeAlong { from, to, ..edge })
+            })
             .collect();
-        candidates.retain(|edge| {
-            let middle = 0.5 * (edge.from.max(low) + edge.to.min(high));
-            self.may_end_at(edge.side.face, point(middle))
-        });
-        if candidates.is_empty() {
-            corners.push((ends[0], Side::scan(self.piece.face)));
+        let scan = Side::scan(self.piece.face);
+        if edges.is_empty() {
+            corners.push((ends[0], scan));
             return;
         }
         // The face's own edge before others, then by id.
-        candidates.sort_by_key(|edge| (edge.side.face != self.piece.face, edge.side));
-        let mut cuts: Vec<f64> = candidates
+        edges.sort_by_key(|edge| (edge.side.face != self.piece.face, edge.side));
+        let mut cuts: Vec<f64> = edges
             .iter()
             .flat_map(|edge| [edge.from, edge.to])
-            .filter(|&cut| cut > low && cut < high)
+            .filter(|&cut| cut > low + COINCIDENT && cut < high - COINCIDENT)
             .chain([low, high])
             .collect();
         cuts.sort_by(f64::total_cmp);
-        cuts.dedup();
-        let mut sides: Vec<(f64, f64, Side)> = Vec::new();
+        cuts.dedup_by(|next, cut| is_coincident(*next, *cut));
+        let mut parts: Vec<(f64, f64, Side)> = Vec::new();
         for stretch in cuts.windows(2) {
-            let side = candidates
+            let middle = 0.5 * (stretch[0] + stretch[1]);
+            let side = edges
                 .iter()
-                .find(|edge| edge.from <= stretch[0] && edge.to >= stretch[1])
-                .map_or(Side::scan(self.piece.face), |edge| edge.side);
-            match sides.last_mut() {
+                .find(|edge| edge.from <= middle && edge.to >= middle)
+                .map_or(scan, |edge| edge.side);
+            match parts.last_mut() {
                 Some(last) if last.2 == side => last.1 = stretch[1],
-                _ => sides.push((stretch[0], stretch[1], side)),
+                _ => parts.push((stretch[0], stretch[1], side)),
             }
         }
         if start > end {
-            corners.extend(sides.iter().rev().map(|&(_, to, side)| (point(to), side)));
+            corners.extend(parts.iter().rev().map(|&(_, to, side)| (point(to), side)));
         } else {
-            corners.extend(sides.iter().map(|&(from, _, side)| (point(from), side)));
+            corners.extend(parts.iter().map(|&(from, _, side)| (point(from), side)));
         }
     }
+}
 
-    /// Whether an edge of `other` may be where this piece's face stops being seen: it is the face's
-    /// own, or one of an opaque face that is not behind. Touching faces are given the benefit of the
-    /// doubt, since both names are of the same line.
-    fn may_end_at(&self, other: FaceId, point: DVec2) -> bool {
-        /// Relative to the planes' coefficients. Larger would name edges of hidden faces; smaller
-        /// would leave edges of touching faces without a name.
-        const TOUCHING: f64 = 1e-12;
-        let face = self.piece.face;
-        if other == face {
-            return true;
+impl From<&EdgeOnScanline> for EdgeAlong {
+    fn from(edge: &EdgeOnScanline) -> Self {
+        Self {
+            from: edge.from,
+            to: edge.to,
+            side: edge.side,
         }
-        if self.faces.is_veil(other) {
-            return false;
-        }
-        if self.faces.plane(face) == self.faces.plane(other) {
-            return other < face;
-        }
-        let (own, its) = (
-            self.faces.face_nearness(face),
-            self.faces.face_nearness(other),
-        );
-        let scale =
-            own.a.abs() + own.b.abs() + own.c.abs() + its.a.abs() + its.b.abs() + its.c.abs();
-        own.minus(its).at(point) <= TOUCHING * scale
+    }
+}
+
+fn is_coincident(one: f64, other: f64) -> bool {
+    (one - other).abs() <= COINCIDENT
+}
+
+/// The part of a stretch in which an affine function is not positive, given its values at the ends.
+fn where_not_positive([from, to]: [f64; 2], values: [f64; 2]) -> Option<[f64; 2]> {
+    let zero = || from + (to - from) * (values[0] / (values[0] - values[1]));
+    match values.map(|value| value <= 0.0) {
+        [true, true] => Some([from, to]),
+        [true, false] => Some([from, zero()]),
+        [false, true] => Some([zero(), to]),
+        [false, false] => None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Between two H-scanlines: which faces enter the strip, and their slices.
 
-use super::{Bound, ROUNDING};
+use super::{Bound, COINCIDENT, ROUNDING};
 use veduta_geometry::DVec2;
 use veduta_map::{FaceId, Faces, Side};
 
@@ -34,11 +34,11 @@ impl Bins {
                 // The quotient may round to either side of an H-scanline, so the scanlines decide.
                 let guess = |y: f64| (y * f64::from(strips)).clamp(0.0, f64::from(strips)) as u32;
                 let mut first = guess(top).min(strips - 1);
-                while first > 0 && h_scanline(first, strips) >= top {
+                while first > 0 && h_scanline(first, strips) >= top - COINCIDENT {
                     first -= 1;
                 }
                 let mut last = guess(bottom).min(strips - 1);
-                while last + 1 < strips && h_scanline(last + 1, strips) <= bottom {
+                while last + 1 < strips && h_scanline(last + 1, strips) <= bottom + COINCIDENT {
                     last += 1;
                 }
                 (first, last)
@@ -172,7 +172,7 @@ pub(super) struct EdgeOnScanline {
 pub(super) struct Entering {
     /// All slices, by face and then by x.
     pub slices: Vec<Slice>,
-    /// Vertical sides of outlines, which no slice has for a bound, by x.
+    /// Vertical sides of outlines, by x: if they are quite vertical no slice has them for a bound.
     pub vertical: Vec<EdgeOnScanline>,
     /// Sides of outlines that lie on the upper or the lower H-scanline.
     pub horizontal: Vec<EdgeOnScanline>,
@@ -214,7 +214,8 @@ impl Entering {
         for index in 0..outline.len() {
             let ends = side_of(outline, index);
             let [p, q] = ends;
-            if p.x == q.x || p.y == q.y {
+            let extent = (q - p).abs();
+            if extent.min_element() <= COINCIDENT {
                 self.note_edge_on_scanline(face, index, ends, strip);
             }
             if p.y.max(q.y) <= strip.top || p.y.min(q.y) >= strip.bottom {
@@ -267,16 +268,18 @@ impl Entering {
         strip: Strip,
     ) {
         let side = Side::of_outline(face, index);
-        if p.x == q.x {
-            if p.y.max(q.y) > strip.top && p.y.min(q.y) < strip.bottom {
-                self.vertical.push(EdgeOnScanline {
-                    at: p.x,
-                    from: p.y.min(q.y),
-                    to: p.y.max(q.y),
-                    side,
-                });
-            }
-        } else if p.y == strip.top || p.y == strip.bottom {
+        let extent = (q - p).abs();
+        let is_vertical = extent.x <= extent.y;
+        if is_vertical && p.y.max(q.y) > strip.top && p.y.min(q.y) < strip.bottom {
+            self.vertical.push(EdgeOnScanline {
+                at: p.x,
+                from: p.y.min(q.y),
+                to: p.y.max(q.y),
+                side,
+            });
+        }
+        let is_at = |y: f64| (p.y - y).abs() <= COINCIDENT;
+        if !is_vertical && (is_at(strip.top) || is_at(strip.bottom)) {
             self.horizontal.push(EdgeOnScanline {
                 at: p.y,
                 from: p.x.min(q.x),

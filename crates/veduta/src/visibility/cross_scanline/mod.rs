@@ -19,6 +19,7 @@
 //! 2. `v_scan`: the sweep in x, which leaves a slice alone as long as no other overlaps it (3-1);
 //! 3. `split`: overlapping slices are cut where edges cross (3-2) and where planes do (§4, virtual
 //!    edges), and the nearest face is found;
+//!    `order` says which of two faces that is;
 //! 4. `emit`: trapezoids become fragments whose sides are named (3-3 needs no more than that: area
 //!    is left to the map's readers).
 //!
@@ -33,6 +34,7 @@
 
 mod emit;
 mod h_scan;
+mod order;
 mod split;
 mod v_scan;
 
@@ -66,6 +68,11 @@ impl Default for Settings {
 /// none: a sliver of this width and at most a pixel long, 1e-15 of the frame's side times a pixel's,
 /// which at 4,096 pixels is 4e-12 of a pixel's area.
 const ROUNDING: f64 = 1e-15;
+
+/// Lines closer than this have one place as far as their names go, so that sides along which several
+/// edges lie are named after the right one. Larger than the rounding of vertices in the middle of
+/// steep edges, far smaller than the thinnest sliver; areas do not depend on it.
+const COINCIDENT: f64 = 1e-12;
 
 /// Finds what is seen of `faces`: the exact regions in which each face is.
 ///
@@ -170,3 +177,6 @@ fn both_between(ends: [f64; 2], along: [f64; 2]) -> [f64; 2] {
 fn is_same_y(one: [f64; 2], other: [f64; 2]) -> bool {
     (one[0] - other[0]).abs() <= ROUNDING && (one[1] - other[1]).abs() <= ROUNDING
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,15 +2,29 @@
 //! part.
 //!
 //! First in x, where bounds cross each other: between two such crossings the bounds have one order
-//! from top to bottom. Between each bound and the next lies a trapezoid in which a fixed set of
-//! faces is, and there the planes decide; where two planes cross inside it, it is cut along the line
-//! in which they do, the paper's virtual edge (§4). A virtual edge is an edge for this trapezoid
-//! only, so no face enters or leaves at it, and it needs no prolongation to the cell's border.
+//! from top to bottom. A cut need not go through the whole cluster, only through the *zone* of
+//! bounds that cross one another, from the next straight bound above to the next one below:
+//!
+//! ```text
+//!     ──────────────────    a bound that crosses nothing
+//!     ╲_      │     _╱
+//!       ╲_    │   _╱        a zone, cut at the crossing
+//!         ╲_  │_╱
+//!           ╲╱│╲
+//!     ────────┴──╲──────    the next bound that crosses nothing here
+//! ```
+//!
+//! Between each bound and the next lies a trapezoid in which a fixed set of faces is, and there the
+//! planes decide; where two planes cross inside it, it is cut along the line in which they do, the
+//! paper's virtual edge (§4). A virtual edge is an edge for this trapezoid only, so no face enters or
+//! leaves at it, and it needs no prolongation to the cell's border.
 
 use super::emit::Layer;
 use super::h_scan::Slice;
-use super::{Bound, Piece, ROUNDING, Trapezoid, between, both_between, is_same_y};
-use veduta_geometry::{Affine, DVec2};
+use super::order::Difference;
+use super::{Bound, COINCIDENT, Piece, ROUNDING, Trapezoid, between, both_between};
+use std::ops::Range;
+use veduta_geometry::DVec2;
 use veduta_map::{FaceId, Faces};
 
 /// A slice of a cluster, with its bounds' y at the two V-scanlines.
@@ -21,15 +35,27 @@ pub(super) struct Member {
     pub bottom: [f64; 2],
 }
 
+/// The strip that clusters are of, and what is found out about it.
+pub(super) struct Found<'a> {
+    pub faces: &'a Faces,
+    pub slices: &'a [Slice],
+    /// Of each slice, whether something in front of it hides a part of it.
+    pub hidden: &'a mut [bool],
+    pub opaque: &'a mut Layer,
+    pub veils: &'a mut Layer,
+}
+
 /// Cuts clusters. It keeps only memory between them.
 #[derive(Default)]
 pub(super) struct Splitter {
+    /// x of the V-scanlines on both sides of the cluster.
+    ends: [f64; 2],
     members: Vec<Member>,
-    /// y of the members' upper and lower bounds at the ends of the current part of the cluster.
-    here: Vec<[[f64; 2]; 2]>,
     /// Upper and lower bounds of the members; sorted from top to bottom where they are used.
     bounds: Vec<MemberBound>,
-    /// V-scanlines at which the rest of the cluster is cut, the leftmost last.
+    /// `reach[i]`: the topmost y of `bounds[i..]` in the current zone, at both ends.
+    reach: Vec<[f64; 2]>,
+    /// The right ends of what is left of each zone, the outermost zone's first.
     cuts: Vec<f64>,
     /// What covers the current trapezoid, in no order, and the same sorted.
     cover: Vec<Covering>,
@@ -44,7 +70,7 @@ pub(super) struct Splitter {
 struct MemberBound {
     member: u32,
     is_lower: bool,
-    /// y at the ends of the current part of the cluster.
+    /// y at the ends of the current part of the zone.
     y: [f64; 2],
 }
 
@@ -63,74 +89,128 @@ struct Covering {
 }
 
 impl Splitter {
-    /// Cuts the cluster of `members` between the V-scanlines at `ends`, hands the pieces to the
-    /// layers (opaque, veils), and notes which slices are `hidden` somewhere.
+    /// Cuts the cluster of `members` between the V-scanlines at `ends`.
     pub fn split(
         &mut self,
-        faces: &Faces,
-        slices: &[Slice],
+        found: &mut Found,
         members: impl Iterator<Item = Member>,
         ends: [f64; 2],
-        hidden: &mut [bool],
-        mut layers: [&mut Layer; 2],
     ) {
+        self.ends = ends;
         self.members.clear();
         self.members.extend(members);
         self.bounds.clear();
-        for member in 0..self.members.len() as u32 {
-            for is_lower in [false, true] {
+        for (index, member) in self.members.iter().enumerate() {
+            for (is_lower, y) in [(false, member.top), (true, member.bottom)] {
                 self.bounds.push(MemberBound {
-                    member,
+                    member: index as u32,
                     is_lower,
-                    y: [0.0; 2],
+                    y,
                 });
             }
         }
-        let mut left = ends[0];
-        self.cuts.clear();
-        self.cuts.push(ends[1]);
-        while let Some(&right) = self.cuts.last() {
-            self.sort_bounds(ends, left, right);
-            if let Some(x) = self.first_crossing(left, right) {
+        self.reach.resize(self.bounds.len(), [0.0; 2]);
+        self.cover.clear();
+        self.zone(found, 0..self.bounds.len(), [None, None], ends);
+        found.opaque.join();
+        found.veils.join();
+    }
+
+    /// Handles the zone of the bounds `run` and of what lies between them and the straight bounds
+    /// `around` it, above and below.
+    ///
+    /// The cover is what it is above the zone, and becomes what it is below.
+    fn zone(
+        &mut self,
+        found: &mut Found,
+        run: Range<usize>,
+        around: [Option<usize>; 2],
+        [mut left, right]: [f64; 2],
+    ) {
+        let first_pieces = [found.opaque.mark(), found.veils.mark()];
+        let outer_cuts = self.cuts.len();
+        self.cuts.push(right);
+        let mut is_cut = false;
+        while let Some(&right) = self.cuts[outer_cuts..].last() {
+            self.sort_bounds(run.clone(), left, right);
+            let all_cross = self.end_of_crossings(run.start, run.end) == run.end;
+            let crossing = all_cross
+                .then(|| self.first_crossing(run.clone(), left, right))
+                .flatten();
+            if let Some(x) = crossing {
                 self.cuts.push(x);
+                is_cut = true;
                 continue;
             }
-            self.from_top_to_bottom(faces, slices, [left, right], hidden, &mut layers);
-            for layer in &mut layers {
-                layer.join();
-                layer.close_between(ends, right);
-            }
+            self.from_top_to_bottom(found, run.clone(), around, [left, right], all_cross);
             left = right;
             self.cuts.pop();
+            if self.cuts.len() > outer_cuts {
+                // Back to the cover above the zone.
+                run.clone().for_each(|index| self.toggle(found, index));
+            }
+        }
+        if is_cut {
+            found.opaque.fold(first_pieces[0]);
+            found.veils.fold(first_pieces[1]);
         }
     }
 
-    /// Evaluates the bounds at `left` and `right`, between the V-scanlines at `ends`, and sorts them
-    /// by the middle.
-    fn sort_bounds(&mut self, ends: [f64; 2], left: f64, right: f64) {
-        let width = ends[1] - ends[0];
-        let along = [left, right].map(|x| (x - ends[0]) / width);
-        self.here.clear();
-        if [left, right] == ends {
-            let y = self
-                .members
-                .iter()
-                .map(|member| [member.top, member.bottom]);
-            self.here.extend(y);
+    /// Bound `index` between two `ends`, which lie between the V-scanlines.
+    fn evaluated(&self, index: usize, ends: [f64; 2]) -> MemberBound {
+        let bound = self.bounds[index];
+        let member = &self.members[bound.member as usize];
+        let y = if bound.is_lower {
+            member.bottom
         } else {
-            self.here.extend(self.members.iter().map(|member| {
-                [
-                    both_between(member.top, along),
-                    both_between(member.bottom, along),
-                ]
-            }));
-        }
-        for bound in &mut self.bounds {
-            bound.y = self.here[bound.member as usize][usize::from(bound.is_lower)];
+            member.top
+        };
+        let y = self.part_of(y, ends);
+        MemberBound { y, ..bound }
+    }
+
+    /// The part between the two `ends` of a line with these `y` at the V-scanlines.
+    fn part_of(&self, y: [f64; 2], ends: [f64; 2]) -> [f64; 2] {
+        let width = self.ends[1] - self.ends[0];
+        both_between(y, ends.map(|x| (x - self.ends[0]) / width))
+    }
+
+    /// Evaluates the bounds `run` at `left` and `right`, sorts them by the middle, and notes how far
+    /// up those further down reach.
+    fn sort_bounds(&mut self, run: Range<usize>, left: f64, right: f64) {
+        for index in run.clone() {
+            self.bounds[index] = self.evaluated(index, [left, right]);
         }
         // Stable, and quick where the order has hardly changed since the last part.
-        self.bounds
-            .sort_by(|bound, other| bound.middle().total_cmp(&other.middle()));
+        self.bounds[run.clone()].sort_by(|bound, other| bound.middle().total_cmp(&other.middle()));
+        let mut topmost = [f64::INFINITY; 2];
+        for index in run.rev() {
+            let y = self.bounds[index].y;
+            topmost = [topmost[0].min(y[0]), topmost[1].min(y[1])];
+            self.reach[index] = topmost;
+        }
+    }
+
+    /// The end of the bounds from `first` on that cross others: `first` itself if that crosses none.
+    fn end_of_crossings(&self, first: usize, end: usize) -> usize {
+        let mut straight = first;
+        while straight < end {
+            let mut lowest = self.bounds[straight].y;
+            let mut next = straight + 1;
+            while next < end
+                && (self.reach[next][0] < lowest[0] - ROUNDING
+                    || self.reach[next][1] < lowest[1] - ROUNDING)
+            {
+                let y = self.bounds[next].y;
+                lowest = lower_of(lowest, y);
+                next += 1;
+            }
+            if next == straight + 1 {
+                break;
+            }
+            straight = next;
+        }
+        straight
     }
 
     /// Where two bounds that are neighbours in the middle cross on the way to an end, if any do.
@@ -138,10 +218,10 @@ impl Splitter {
     /// Looking at neighbours is enough: of bounds that are out of order at an end, some neighbours
     /// are. After a cut at the crossing the two are in order on both sides, but for rounding, so
     /// the cutting comes to an end.
-    fn first_crossing(&self, left: f64, right: f64) -> Option<f64> {
+    fn first_crossing(&self, run: Range<usize>, left: f64, right: f64) -> Option<f64> {
         let half = 0.5 * (right - left);
         let middle = left + half;
-        self.bounds.windows(2).find_map(|pair| {
+        self.bounds[run].windows(2).find_map(|pair| {
             let at_middle = 0.5 * (pair[0].middle() - pair[1].middle());
             [(0, -half), (1, half)].into_iter().find_map(|(end, way)| {
                 let at_end = pair[0].y[end] - pair[1].y[end];
@@ -154,57 +234,92 @@ impl Splitter {
         })
     }
 
-    /// Goes through the trapezoids between each bound and the next.
+    /// Goes through the trapezoids between each bound of `run` and the next, and through the zones in
+    /// between; with `in_order`, what is left of crossings is taken for rounding.
     fn from_top_to_bottom(
         &mut self,
-        faces: &Faces,
-        slices: &[Slice],
-        [left, right]: [f64; 2],
-        hidden: &mut [bool],
-        layers: &mut [&mut Layer; 2],
+        found: &mut Found,
+        run: Range<usize>,
+        [above, below]: [Option<usize>; 2],
+        ends: [f64; 2],
+        in_order: bool,
     ) {
-        self.cover.clear();
-        let mut top = self.bounds[0].y;
-        for index in 0..self.bounds.len() {
-            let MemberBound { member, y, .. } = self.bounds[index];
-            // Never above the bound before, so that rounding makes neither gap nor overlap.
-            let bottom = [y[0].max(top[0]), y[1].max(top[1])];
-            let is_flat = bottom[0] - top[0] <= ROUNDING && bottom[1] - top[1] <= ROUNDING;
-            if !self.cover.is_empty() && !is_flat {
-                let shape = Trapezoid {
-                    left,
-                    right,
-                    top,
-                    bottom,
-                    above: self.name(slices, index - 1),
-                    below: self.name(slices, index),
-                };
-                self.see(faces, slices, shape, hidden, layers);
+        // The last bound's place, and its y, moved down where rounding has put it above others.
+        let mut above = above.map(|above| (above, self.evaluated(above, ends).y));
+        let mut index = run.start;
+        while index < run.end {
+            let straight = if in_order {
+                index
+            } else {
+                self.end_of_crossings(index, run.end)
+            };
+            let next = if straight < run.end {
+                Some(straight)
+            } else {
+                below
+            };
+            if straight > index {
+                let around = [above.map(|(place, _)| place), next];
+                self.zone(found, index..straight, around, ends);
+            } else {
+                self.between_bounds(found, above, next, ends);
             }
-            // The member's first bound lets it in and the second lets it out. Which of them is the
-            // lower one does not matter: a slice thinner than rounding may be upside down.
-            let is_member = |covering: &Covering| covering.member == member;
-            match self.cover.iter().position(is_member) {
-                Some(place) => {
-                    self.cover.swap_remove(place);
-                }
-                None => {
-                    let slice = self.members[member as usize].slice;
-                    let face = slices[slice as usize].face;
-                    self.cover.push(Covering { face, member });
-                }
+            if straight == run.end {
+                return;
             }
-            top = bottom;
+            self.toggle(found, straight);
+            let y = self.bounds[straight].y;
+            above = Some((straight, above.map_or(y, |(_, above)| lower_of(y, above))));
+            index = straight + 1;
+        }
+        self.between_bounds(found, above, below, ends);
+    }
+
+    /// At a member's first bound it enters the cover, at the second it leaves. Which of them is the
+    /// lower one does not matter: a slice thinner than rounding may be upside down.
+    fn toggle(&mut self, found: &Found, index: usize) {
+        let member = self.bounds[index].member;
+        let place = self.cover.iter().position(|other| other.member == member);
+        if let Some(place) = place {
+            self.cover.swap_remove(place);
+        } else {
+            let slice = self.members[member as usize].slice;
+            let face = found.slices[slice as usize].face;
+            self.cover.push(Covering { face, member });
         }
     }
 
-    /// What makes bound `index`.
-    fn name(&self, slices: &[Slice], index: usize) -> Bound {
-        let MemberBound {
-            member, is_lower, ..
-        } = self.bounds[index];
-        let slice = &slices[self.members[member as usize].slice as usize];
-        if is_lower {
+    /// Handles the trapezoid between two neighbouring bounds.
+    fn between_bounds(
+        &mut self,
+        found: &mut Found,
+        above: Option<(usize, [f64; 2])>,
+        below: Option<usize>,
+        ends: [f64; 2],
+    ) {
+        let (Some((above, top)), Some(below)) = (above, below) else {
+            return;
+        };
+        if self.cover.is_empty() {
+            return;
+        }
+        let shape = Trapezoid {
+            left: ends[0],
+            right: ends[1],
+            top,
+            bottom: lower_of(self.evaluated(below, ends).y, top),
+            above: self.name(found, &self.bounds[above]),
+            below: self.name(found, &self.bounds[below]),
+        };
+        if !shape.is_flat() {
+            self.see(found, shape);
+        }
+    }
+
+    /// What makes a bound.
+    fn name(&self, found: &Found, bound: &MemberBound) -> Bound {
+        let slice = &found.slices[self.members[bound.member as usize].slice as usize];
+        if bound.is_lower {
             slice.bottom.bound
         } else {
             slice.top.bound
@@ -212,48 +327,39 @@ impl Splitter {
     }
 
     /// Finds what is seen in the trapezoid `shape`, which every face of the cover covers.
-    fn see(
-        &mut self,
-        faces: &Faces,
-        slices: &[Slice],
-        shape: Trapezoid,
-        hidden: &mut [bool],
-        [opaque, veils]: &mut [&mut Layer; 2],
-    ) {
+    fn see(&mut self, found: &mut Found, shape: Trapezoid) {
+        let faces = found.faces;
         self.sort_cover(faces, &shape);
         self.nearest.clear();
         if let Some((&first, rest)) = self.opaque.split_first() {
             nearest(faces, shape, first, rest, &mut self.nearest);
         }
         for &(covering, part) in &self.nearest {
-            opaque.stack(self.piece(slices, covering, &shape, part));
+            let piece = self.piece(found, covering, &shape, part);
+            found.opaque.stack(piece);
         }
         // What rounding may have hidden does not keep a face from being seen whole.
         let matters = !shape.is_negligible();
-        let mut hide = |covering: &Covering| {
-            hidden[self.members[covering.member as usize].slice as usize] |= matters;
-        };
         for covering in &self.opaque {
             let is_seen = |(seen, _): &(Covering, _)| seen.face == covering.face;
-            if !self.nearest.iter().all(is_seen) {
-                hide(covering);
+            if matters && !self.nearest.iter().all(is_seen) {
+                self.hide(found, *covering);
             }
         }
-        for veil in &self.veils {
+        for &veil in &self.veils {
             if self.nearest.is_empty() {
-                veils.stack(self.piece(slices, *veil, &shape, shape));
+                let piece = self.piece(found, veil, &shape, shape);
+                found.veils.stack(piece);
             }
             for &(front, part) in &self.nearest {
-                match compare(faces, veil.face, front.face, &part) {
-                    Order::Front => veils.stack(self.piece(slices, *veil, &shape, part)),
-                    Order::Behind => hide(veil),
-                    Order::Crossing(parts) => {
-                        hide(veil);
-                        for seen in parts.iter().filter(|part| part.first_is_front) {
-                            veils.stack(self.piece(slices, *veil, &shape, seen.shape));
-                        }
-                    }
+                let order = compare(faces, veil.face, front.face, &part);
+                if matters && !matches!(order, Order::Front) {
+                    self.hide(found, veil);
                 }
+                order.for_each_front(part, |part| {
+                    let piece = self.piece(found, veil, &shape, part);
+                    found.veils.stack(piece);
+                });
             }
         }
     }
@@ -274,35 +380,49 @@ impl Splitter {
             }
             self.opaque.push(covering);
             let last = self.opaque.len() - 1;
-            if is_in_front(faces, covering.face, self.opaque[0].face, middle) {
+            if Difference::of(faces, covering.face, self.opaque[0].face).is_in_front(middle) {
                 self.opaque.swap(0, last);
             }
         }
+    }
+
+    fn hide(&self, found: &mut Found, covering: Covering) {
+        found.hidden[self.members[covering.member as usize].slice as usize] = true;
     }
 
     /// What is seen of a face in `part` of the trapezoid `shape`. A face prefers its own name for a
     /// bound that it shares with others.
     fn piece(
         &self,
-        slices: &[Slice],
+        found: &Found,
         covering: Covering,
         shape: &Trapezoid,
         part: Trapezoid,
     ) -> Piece {
-        let slice = &slices[self.members[covering.member as usize].slice as usize];
-        let [top, bottom] = self.here[covering.member as usize];
+        let member = &self.members[covering.member as usize];
+        let slice = &found.slices[member.slice as usize];
+        let is_own = |y: [f64; 2], own: [f64; 2]| {
+            let own = self.part_of(own, [shape.left, shape.right]);
+            (y[0] - own[0]).abs() <= COINCIDENT && (y[1] - own[1]).abs() <= COINCIDENT
+        };
         let mut piece = Piece {
             face: covering.face,
             shape: part,
         };
-        if part.above == shape.above && is_same_y(shape.top, top) {
+        // Other bounds of the part are virtual edges.
+        if part.above == shape.above && is_own(shape.top, member.top) {
             piece.shape.above = slice.top.bound;
         }
-        if part.below == shape.below && is_same_y(shape.bottom, bottom) {
+        if part.below == shape.below && is_own(shape.bottom, member.bottom) {
             piece.shape.below = slice.bottom.bound;
         }
         piece
     }
+}
+
+/// The lower of two bounds, at either end.
+fn lower_of(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].max(other[0]), one[1].max(other[1])]
 }
 
 /// Finds the nearest of `front` and `others` in `shape`, in parts where there is not one alone.
@@ -339,7 +459,21 @@ enum Order {
     Crossing(Parts),
 }
 
-/// A trapezoid cut along the line in which two planes cross.
+impl Order {
+    /// Calls `see` with the parts of `shape` in which the first face is in front.
+    fn for_each_front(&self, shape: Trapezoid, mut see: impl FnMut(Trapezoid)) {
+        match self {
+            Order::Front => see(shape),
+            Order::Behind => {}
+            Order::Crossing(parts) => parts
+                .iter()
+                .filter(|part| part.first_is_front)
+                .for_each(|part| see(part.shape)),
+        }
+    }
+}
+
+/// A part of a trapezoid that was cut along the line in which two planes cross.
 #[derive(Clone, Copy)]
 struct Part {
     shape: Trapezoid,
@@ -358,43 +492,12 @@ impl Parts {
     }
 }
 
-/// The difference of two faces' nearness, or which is in front everywhere.
-enum Difference {
-    Everywhere(Order),
-    Affine(Affine),
-}
-
-fn difference(faces: &Faces, first: FaceId, second: FaceId) -> Difference {
-    let by_id = || {
-        Difference::Everywhere(if first < second {
-            Order::Front
-        } else {
-            Order::Behind
-        })
-    };
-    let (plane, other) = (faces.plane(first), faces.plane(second));
-    if plane == other {
-        return by_id();
-    }
-    let difference = faces.nearness(plane).minus(faces.nearness(other));
-    if difference == Affine::default() {
-        return by_id();
-    }
-    Difference::Affine(difference)
-}
-
-fn is_in_front(faces: &Faces, first: FaceId, second: FaceId, point: DVec2) -> bool {
-    match difference(faces, first, second) {
-        Difference::Everywhere(order) => matches!(order, Order::Front),
-        Difference::Affine(difference) => difference.at(point) > 0.0,
-    }
-}
-
 /// Which of two faces is in front in `shape`, where both are.
 fn compare(faces: &Faces, first: FaceId, second: FaceId, shape: &Trapezoid) -> Order {
-    let difference = match difference(faces, first, second) {
-        Difference::Everywhere(order) => return order,
+    let difference = match Difference::of(faces, first, second) {
         Difference::Affine(difference) => difference,
+        Difference::FirstInFront => return Order::Front,
+        Difference::SecondInFront => return Order::Behind,
     };
     let at_corners = |y: [f64; 2]| {
         [

@@ -5,7 +5,7 @@
 
 use super::emit::{self, Layer};
 use super::h_scan::{Entering, Slice, Strip};
-use super::split::{Member, Splitter};
+use super::split::{Found, Member, Splitter};
 use super::{Piece, ROUNDING, StripSeen, Trapezoid};
 use veduta_map::{FaceId, Faces};
 
@@ -273,14 +273,15 @@ impl Sweep {
                     .push(active.piece(slice, since, left));
             }
         }
-        self.splitter.split(
+        let mut found = Found {
             faces,
-            &self.entering.slices,
-            self.active[cluster].iter().map(Active::member),
-            [left, right],
-            &mut self.hidden,
-            [&mut self.opaque, &mut self.veils],
-        );
+            slices: &self.entering.slices,
+            hidden: &mut self.hidden,
+            opaque: &mut self.opaque,
+            veils: &mut self.veils,
+        };
+        let members = self.active[cluster].iter().map(Active::member);
+        self.splitter.split(&mut found, members, [left, right]);
     }
 
     fn finish(&mut self, faces: &Faces, strip: Strip) -> StripSeen {
