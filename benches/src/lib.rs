@@ -4,5 +4,8 @@
 //! simpler one is well made. [`zbuffer`] is that: plain, single-threaded, and as quick as plain
 //! code gets. Multiscan is part of the library.
 
+pub mod cases;
+pub mod fit;
+pub mod table;
 pub mod timing;
 pub mod zbuffer;

@@ -1,3 +1,237 @@
-//! Measures the engines against one another.
+//! `veduta-bench`: tables of what finding visibility costs.
+//!
+//! CPU time of one thread, the least of several rounds in which the methods take turns, from
+//! projected faces on.
 
-fn main() {}
+use std::process::ExitCode;
+use veduta::visibility::{multiscan, speculative};
+use veduta_bench::cases::Case;
+use veduta_bench::fit::Line;
+use veduta_bench::table::Table;
+use veduta_bench::timing::{least_times, milliseconds, on_one_thread};
+use veduta_bench::zbuffer::ZBuffer;
+
+const USAGE: &str = "\
+Usage: veduta-bench TABLE [SCENE[@WIDTHxHEIGHT]...]
+
+Tables:
+  n-et      multiscan by its number of sub-scanlines, and how many of them cost as much as
+            the exact map (Tanaka & Takahashi 1991, table 1)
+  zbuffer   the exact map against a z-buffer with one sample a pixel
+  engines   all methods to pixels, supersampling included
+
+Without scenes, those that the documentation tells of.";
+
+/// Rounds of measuring, for scenes that do not take long.
+const ROUNDS: u32 = 7;
+
+/// A table: what it tells of each scene, and of which scenes unless told.
+struct Measurement {
+    name: &'static str,
+    scenes: &'static [&'static str],
+    titles: &'static [&'static str],
+    row: fn(&Case) -> Vec<String>,
+}
+
+const MEASUREMENTS: [Measurement; 3] = [
+    Measurement {
+        name: "n-et",
+        scenes: &["radial", "buildings", "balls3", "balls7"],
+        titles: &[
+            "scene, ms",
+            "n = 1",
+            "n = 2",
+            "n = 4",
+            "n = 8",
+            "n = 16",
+            "each",
+            "none",
+            "map",
+            "map = n",
+        ],
+        row: sub_scanlines,
+    },
+    Measurement {
+        name: "zbuffer",
+        scenes: &[
+            "balls7@1920x1080",
+            "field1m@1920x1080",
+            "field10m@1920x1080",
+            "leaves100@1920x1080",
+            "leaves20@1920x1080",
+            "leaves400@1920x1080",
+            "soup@1920x1080",
+            "wires@1920x1080",
+            "layers@960x540",
+            "bridge@1920x1080",
+            "pierce@512x512",
+            "balls7@512x512",
+        ],
+        titles: &["scene, ms", "faces", "z-buffer", "map", "ratio"],
+        row: against_zbuffer,
+    },
+    Measurement {
+        name: "engines",
+        scenes: &[
+            "radial",
+            "mesh5",
+            "buildings",
+            "bridge",
+            "balls3",
+            "balls7",
+            "pierce",
+            "field100k@512x512",
+        ],
+        titles: &[
+            "scene, ms",
+            "z-buffer",
+            "with pixels",
+            "4 x 4",
+            "8 x 8",
+            "multiscan 4",
+            "multiscan 8",
+            "map",
+        ],
+        row: engines,
+    },
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let Some((name, scenes)) = arguments.split_first() else {
+        eprintln!("{USAGE}");
+        return ExitCode::from(2);
+    };
+    if name == "--help" || name == "-h" {
+        println!("{USAGE}");
+        return ExitCode::SUCCESS;
+    }
+    match print_table(name, scenes) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("veduta-bench: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Measures and prints the table `name`.
+///
+/// # Errors
+/// A sentence about a name that is not known.
+fn print_table(name: &str, scenes: &[String]) -> Result<(), String> {
+    let measurement = MEASUREMENTS
+        .iter()
+        .find(|measurement| measurement.name == name)
+        .ok_or_else(|| format!("there is no table {name}; `--help` lists them"))?;
+    let mut titles: Vec<&str> = scenes.iter().map(String::as_str).collect();
+    if titles.is_empty() {
+        titles = measurement.scenes.to_vec();
+    }
+    let mut table = Table::new(measurement.titles);
+    for title in titles {
+        // One at a time: the largest scene has ten million faces.
+        let case = Case::parse(title)?;
+        eprintln!("{}: {} faces in view", case.title(), case.faces.len());
+        table.row(on_one_thread(|| (measurement.row)(&case)));
+    }
+    print!("{table}");
+    Ok(())
+}
+
+/// Multiscan to pixels with 1, 2, 4, 8 and 16 sub-scanlines; the line through these times; the n at
+/// which it meets the exact map's. (The paper counts inserted sub-scanlines, one less than n.)
+fn sub_scanlines(case: &Case) -> Vec<String> {
+    const COUNTS: [u32; 5] = [1, 2, 4, 8, 16];
+    let scan = |n| {
+        move || {
+            multiscan_picture(case, n);
+        }
+    };
+    let [mut n1, mut n2, mut n4, mut n8, mut n16] = COUNTS.map(scan);
+    let [map, scans @ ..] = least_times(
+        ROUNDS,
+        [
+            &mut || exact_map(case),
+            &mut n1,
+            &mut n2,
+            &mut n4,
+            &mut n8,
+            &mut n16,
+        ],
+    )
+    .map(milliseconds);
+    let points: Vec<(f64, f64)> = COUNTS.map(f64::from).into_iter().zip(scans).collect();
+    let line = Line::through(&points);
+    let mut row = vec![case.title()];
+    row.extend(scans.map(ms));
+    row.extend([line.slope, line.intercept, map].map(ms));
+    row.push(format!("{:.1}", line.x_of(map)));
+    row
+}
+
+/// The exact map and the z-buffer.
+fn against_zbuffer(case: &Case) -> Vec<String> {
+    let mut buffer = ZBuffer::new(case.width, case.height);
+    let [z, map] = least_times(
+        ROUNDS,
+        [&mut || buffer.find(&case.faces), &mut || exact_map(case)],
+    )
+    .map(milliseconds);
+    vec![
+        case.title(),
+        case.faces.len().to_string(),
+        ms(z),
+        ms(map),
+        format!("{:.1}", map / z),
+    ]
+}
+
+/// All methods.
+fn engines(case: &Case) -> Vec<String> {
+    let mut buffer = ZBuffer::new(case.width, case.height);
+    let mut resolved = ZBuffer::new(case.width, case.height);
+    let [mut fours, mut eights] = [4, 8].map(|n| ZBuffer::new(n * case.width, n * case.height));
+    let times = least_times(
+        ROUNDS,
+        [
+            &mut || buffer.find(&case.faces),
+            &mut || supersample(case, &mut resolved, 1),
+            &mut || supersample(case, &mut fours, 4),
+            &mut || supersample(case, &mut eights, 8),
+            &mut || multiscan_picture(case, 4),
+            &mut || multiscan_picture(case, 8),
+            &mut || exact_map(case),
+        ],
+    );
+    let mut row = vec![case.title()];
+    row.extend(times.map(milliseconds).map(ms));
+    row
+}
+
+fn exact_map(case: &Case) {
+    let settings = speculative::Settings {
+        aspect: f64::from(case.width) / f64::from(case.height),
+        ..speculative::Settings::default()
+    };
+    std::hint::black_box(speculative::find(&case.faces, &settings));
+}
+
+fn multiscan_picture(case: &Case, n: u32) {
+    let spans = multiscan::find_spans(&case.faces, case.width, case.height, n);
+    std::hint::black_box(spans.picture(|face| case.color(face)));
+}
+
+fn supersample(case: &Case, buffer: &mut ZBuffer, n: usize) {
+    buffer.find(&case.faces);
+    std::hint::black_box(buffer.resolve(n, |face| case.color(face)));
+}
+
+/// Three digits or more, as the spread allows no others.
+fn ms(milliseconds: f64) -> String {
+    match milliseconds.abs() {
+        long if long >= 100.0 => format!("{milliseconds:.0}"),
+        long if long >= 10.0 => format!("{milliseconds:.1}"),
+        _ => format!("{milliseconds:.2}"),
+    }
+}

@@ -3,29 +3,29 @@
 use cpu_time::ThreadTime;
 use std::time::Duration;
 
-/// A measurement stops early once it has taken this long.
-const PATIENCE: Duration = Duration::from_secs(8);
+/// A measurement ends after the round in which it has taken this long.
+const PATIENCE: Duration = Duration::from_secs(12);
 
-/// Runs `work` up to `repetitions` times, at least once; the least CPU time of this thread, and
-/// what the last run gave.
+/// Runs all of `work` in turn, for up to `rounds` rounds; the least CPU time of this thread that
+/// each took.
 ///
-/// The least, because whatever else the machine does can only add. Work that is shared among
-/// threads must be run in a pool of one, see [`on_one_thread`].
-pub fn least_time<T>(repetitions: u32, mut work: impl FnMut() -> T) -> (Duration, T) {
+/// The least, because whatever else the machine does can only add; in turn, so that a busy moment
+/// meets all alike. Work that is shared among threads must be run in a pool of one, see
+/// [`on_one_thread`].
+pub fn least_times<const N: usize>(rounds: u32, mut work: [&mut dyn FnMut(); N]) -> [Duration; N] {
     let begin = ThreadTime::now();
-    let mut least = Duration::MAX;
-    let mut repetition = 0;
-    loop {
-        let start = ThreadTime::now();
-        let result = std::hint::black_box(work());
-        least = least.min(start.elapsed());
-        repetition += 1;
-        if repetition >= repetitions || begin.elapsed() > PATIENCE {
-            return (least, result);
+    let mut least = [Duration::MAX; N];
+    for round in 0..rounds.max(1) {
+        if round > 0 && begin.elapsed() > PATIENCE {
+            break;
         }
-        // Dropped before the next run, as a program that makes one picture would never hold two.
-        drop(result);
+        for (least, work) in least.iter_mut().zip(&mut work) {
+            let start = ThreadTime::now();
+            work();
+            *least = (*least).min(start.elapsed());
+        }
     }
+    least
 }
 
 /// Runs `work` on a thread whose parallel work stays on that thread.
@@ -43,4 +43,39 @@ pub fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// A duration in milliseconds.
 pub fn milliseconds(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twice_the_work_takes_longer() {
+        let spin = |steps: u64| {
+            move || {
+                std::hint::black_box(
+                    (0..steps).fold(1_u64, |x, k| std::hint::black_box(x).wrapping_mul(k | 1)),
+                );
+            }
+        };
+        let [once, thrice] = least_times(5, [&mut spin(1_000_000), &mut spin(3_000_000)]);
+        assert!(
+            thrice > once,
+            "{thrice:?} for three times what takes {once:?}"
+        );
+    }
+
+    #[test]
+    fn parallel_work_stays_on_the_one_thread() {
+        use rayon::prelude::*;
+        let ids: Vec<_> = on_one_thread(|| {
+            let mut ids: Vec<_> = (0..64_u32)
+                .into_par_iter()
+                .map(|_| std::thread::current().id())
+                .collect();
+            ids.push(std::thread::current().id());
+            ids
+        });
+        assert!(ids.windows(2).all(|pair| pair[0] == pair[1]));
+    }
 }

@@ -18,6 +18,8 @@ const ANCHOR_Z: f64 = 66.0;
 const CABLE_Y: f64 = 14.0;
 const DECK_Z: f64 = 62.0;
 const DECK_HALF_WIDTH: f64 = 12.5;
+/// Well inland, where the road has met the ground.
+const DECK_END: f64 = 900.0;
 const HANGER_DISTANCE: f64 = 10.0;
 /// A tenth of a pixel in the picture of 512 rows.
 const HANGER_WIDTH: f64 = 0.09;
@@ -74,12 +76,11 @@ fn cable_height(x: f64) -> f64 {
 fn water(scene: &mut Scene) {
     let mut faces = Patchwork::new();
     let (near, far, side) = (-560.0_f64, 14000.0_f64, 16000.0);
-    let strips = 28;
+    let strips = 120;
     let edge = |strip: i32| near + (far - near) * (f64::from(strip) / f64::from(strips)).powi(3);
     for strip in 0..strips {
         let (y0, y1) = (edge(strip), edge(strip + 1));
-        let ripple = if strip % 2 == 0 { 0.04 } else { 0.0 };
-        let share = strip as f32 / strips as f32 + ripple;
+        let share = strip as f32 / strips as f32;
         faces.quad(
             [
                 DVec3::new(-side, y0, 0.0),
@@ -107,7 +108,7 @@ fn bank(scene: &mut Scene, name: &str, side: f64) {
         // Levelled where the road comes ashore.
         let road = (-(y / 60.0).powi(2)).exp();
         let rise = (slope * inland).min(150.0) + hills * (inland / 160.0).clamp(0.0, 1.0);
-        rise + (rise.clamp(-30.0, DECK_Z - 6.0) - rise) * road
+        rise + (rise.clamp(-30.0, DECK_Z - 1.0) - rise) * road
     };
     let point = |column: u32, row: u32| {
         let x = side * (330.0 + CELL * f64::from(column));
@@ -145,14 +146,14 @@ fn deck(scene: &mut Scene) {
     let mut faces = Patchwork::new();
     let half = DECK_HALF_WIDTH;
     faces.block(
-        DVec3::new(-640.0, -half, DECK_Z - 3.2),
-        DVec3::new(640.0, half, DECK_Z - 0.4),
+        DVec3::new(-DECK_END, -half, DECK_Z - 3.2),
+        DVec3::new(DECK_END, half, DECK_Z - 0.4),
         steel,
     );
     // The roadway lies on it.
     faces.block(
-        DVec3::new(-640.0, -half + 1.0, DECK_Z - 0.4),
-        DVec3::new(640.0, half - 1.0, DECK_Z),
+        DVec3::new(-DECK_END, -half + 1.0, DECK_Z - 0.4),
+        DVec3::new(DECK_END, half - 1.0, DECK_Z),
         srgb(0x77777c),
     );
     faces.place(scene, "deck", Sides::Outer);

@@ -270,7 +270,7 @@ mod tests {
         let made = by_name("bridge").expect("a name of the list");
         for (name, expected) in [
             // A block and the roadway on it; four blocks.
-            ("deck", 1280.0 * (25.0 * 2.8 + 23.0 * 0.4)),
+            ("deck", 1800.0 * (25.0 * 2.8 + 23.0 * 0.4)),
             ("anchorages", 4.0 * 40.0 * 6.2 * 90.0),
         ] {
             let object = made.scene.objects.iter().find(|object| object.name == name);

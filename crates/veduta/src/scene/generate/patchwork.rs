@@ -1,3 +1,5 @@
+//! Meshes of flat-coloured faces, and the bodies that the scenes are built of.
+
 use crate::scene::{Material, Mesh, MeshId, Object, Scene};
 use veduta_geometry::{DMat4, DVec3};
 use veduta_map::MaterialId;

@@ -1,3 +1,5 @@
+//! Random numbers that stay the same.
+
 /// A fixed sequence of numbers from a seed: SplitMix64 (Steele, Lea and Flood, 2014).
 ///
 /// Ours rather than a library's, so that a scene named in a table of measurements stays the same

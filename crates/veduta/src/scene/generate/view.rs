@@ -1,3 +1,5 @@
+//! Cameras that look along +Y, for scenes laid out in the picture.
+
 use veduta_geometry::{DMat4, DVec2, DVec3};
 use veduta_map::{Camera, Projection};
 

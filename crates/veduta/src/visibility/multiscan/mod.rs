@@ -90,7 +90,10 @@ impl Spans {
         self.per_row
     }
 
-    /// The spans of sub-scanline `index`, in `0..=n * height`.
+    /// The spans of sub-scanline `index`.
+    ///
+    /// # Panics
+    /// If `index` is greater than `n * height`.
     pub fn sub_scanline(&self, index: u32) -> &[Span] {
         let band = (index / (ROWS_PER_BAND * self.per_row)) as usize;
         // The last sub-scanline belongs to the last band, which may be full without it.

@@ -1,3 +1,5 @@
+//! Spans -> pixels: "Regeneration of images" in Nakamae et al. (1989).
+
 use super::{ROWS_PER_BAND, Span, Spans};
 use crate::accumulate::Picture;
 use rayon::prelude::*;

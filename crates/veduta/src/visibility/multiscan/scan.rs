@@ -1,6 +1,13 @@
+//! Down the picture: which faces cross each sub-scanline, and where.
+//!
+//! Active faces are kept from one sub-scanline to the next with the two sides that cross it, as in
+//! any scanline algorithm; but x is computed from the side's upper end, not summed step by step, so
+//! that it depends neither on where a band begins nor on which of two neighbours asks.
+
 use super::sweep::Sweep;
 use super::{ROWS_PER_BAND, Span};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces};
 
@@ -212,6 +219,7 @@ impl ActiveFace {
 /// The left and the right side of a convex outline at height `y`, which must cross it.
 #[inline]
 fn sides_at(outline: &[DVec2], y: f64) -> [Edge; 2] {
+    // Both are found, since the height lies between the topmost and the lowest vertex.
     let mut sides = [Edge::new(outline[0], outline[0]); 2];
     let mut previous = outline[outline.len() - 1];
     for &vertex in outline {
@@ -235,6 +243,13 @@ pub(super) struct LeftEnd {
     pub(super) slot: u32,
 }
 
+impl LeftEnd {
+    #[inline]
+    fn order(&self, other: &Self) -> Ordering {
+        self.x.total_cmp(&other.x).then(self.face.cmp(&other.face))
+    }
+}
+
 fn scan_band(
     faces: &Faces,
     heights: &[f64],
@@ -251,6 +266,7 @@ fn scan_band(
     let mut active: Vec<ActiveFace> = Vec::new();
     let mut free: Vec<u32> = Vec::new();
     let mut left_ends: Vec<LeftEnd> = Vec::new();
+    let mut newcomers: Vec<LeftEnd> = Vec::new();
     let mut sweep = Sweep::default();
     for line in lines {
         let y = heights[line as usize];
@@ -263,6 +279,7 @@ fn scan_band(
             left_end.x = face.go_to(faces, y);
             true
         });
+        let retained = left_ends.len();
         for &face in entries.at(line) {
             let end = entries.extents[face.index()][1];
             let mut entering = ActiveFace::new(faces, face, end, y);
@@ -275,7 +292,7 @@ fn scan_band(
             }
             left_ends.push(LeftEnd { x, face, slot });
         }
-        sort(&mut left_ends);
+        sort(&mut left_ends, retained, &mut newcomers);
         sweep.along(y, &left_ends, &active, |face, left, right| {
             let (left, right) = (left * width, right * width);
             if left < right {
@@ -288,7 +305,38 @@ fn scan_band(
     band
 }
 
-/// Sorts by left end. From one sub-scanline to the next few change places.
-fn sort(left_ends: &mut [LeftEnd]) {
-    left_ends.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.face.cmp(&b.face)));
+/// Sorts by left end, where the first `retained` were in order on the sub-scanline before: few of
+/// them have changed places, and the others are merged in.
+fn sort(left_ends: &mut [LeftEnd], retained: usize, newcomers: &mut Vec<LeftEnd>) {
+    // So many moves cost about as much as a sort that knows nothing.
+    let mut moves_left = 6 * retained;
+    for next in 1..retained {
+        let moving = left_ends[next];
+        let mut place = next;
+        while place > 0 && moving.order(&left_ends[place - 1]).is_lt() {
+            left_ends[place] = left_ends[place - 1];
+            place -= 1;
+        }
+        left_ends[place] = moving;
+        if next - place > moves_left {
+            left_ends.sort_unstable_by(LeftEnd::order);
+            return;
+        }
+        moves_left -= next - place;
+    }
+    newcomers.clear();
+    newcomers.extend_from_slice(&left_ends[retained..]);
+    newcomers.sort_unstable_by(LeftEnd::order);
+    // From the back, into the room that the newcomers leave.
+    let (mut place, mut old) = (left_ends.len(), retained);
+    while let Some(newcomer) = newcomers.last() {
+        place -= 1;
+        if old > 0 && newcomer.order(&left_ends[old - 1]).is_lt() {
+            old -= 1;
+            left_ends[place] = left_ends[old];
+        } else {
+            left_ends[place] = *newcomer;
+            newcomers.pop();
+        }
+    }
 }

@@ -1,3 +1,5 @@
+//! Along a sub-scanline: which of the faces that cross it is in front, and from where to where.
+
 use super::scan::{ActiveFace, LeftEnd};
 use veduta_geometry::DVec2;
 use veduta_map::FaceId;
