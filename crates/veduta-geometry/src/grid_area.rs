@@ -20,9 +20,10 @@
 //! bound, from above downwards: polygons with a common edge share a cell without gap or overlap, to
 //! the last bits. The same cuts give first moments (∫x and ∫y), thus centroids: see [`CellArea`].
 //!
-//! Signed-area accumulation of glyph rasterisers (FreeType, font-rs) is the usual way to do this. It
-//! handles any polygon but sweeps each row up to its end; being convex spares us that and the
-//! buffer, but for rows with a vertex in them.
+//! Signed-area accumulation as in glyph rasterisers (FreeType, font-rs) is the usual way: each edge is
+//! added to a buffer for itself, and a sweep along the rows sums up. It handles any polygon. Built and
+//! measured beside this (`examples/time_grid_area.rs`, one thread of an AMD EPYC), it took as long for
+//! triangles with sides of 3 cells, 1.15 times as long for 1 cell, 1.3 for 10 and 1.6 for 30 and more.
 
 use crate::{DVec2, cross};
 use std::ops::{AddAssign, Mul, Range, Sub, SubAssign};

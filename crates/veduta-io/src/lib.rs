@@ -1,1 +1,21 @@
-//! Foreign formats, in and out.
+//! Foreign formats, in and out: files of other programs -> [`Scene`](veduta::scene::Scene), and
+//! [`Picture`](veduta::accumulate::Picture) -> files that other programs read.
+//!
+//! Bytes that come from outside are not trusted. Whatever a file holds, reading it ends in a scene
+//! that [`Mesh::check`](veduta::scene::Mesh::check) accepts or in a [`ReadError`] that says where
+//! the file is wrong, in memory that the bytes at hand can justify.
+//!
+//! Each format is behind a feature of its name; all are on by default.
+
+mod read;
+pub mod tone;
+mod write;
+
+pub use read::{
+    ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
+    read_scene,
+};
+pub use write::{
+    PICTURE_SUFFIXES, PictureFormat, PictureOptions, PngDepth, WriteError, WriteProblem,
+    remove_unfinished, write_picture,
+};

@@ -6,8 +6,8 @@
 //!
 //! 1. [`Surfaces`] looks once at each seen face. Most have one colour all over (no texture, no
 //!    interpolated normal): it is worked out here, and their parts cost a look-up. The others are made
-//!    ready for evaluation anywhere ([`surface`]).
-//! 2. Pyramids of the pictures in use are made ([`texture`]).
+//!    ready for evaluation anywhere (`surface.rs`).
+//! 2. Pyramids of the pictures in use are made (`texture.rs`).
 //! 3. [`Surfaces::shade`] evaluates the parts of a band.
 //!
 //! The light is a stand-in, a sun and a plain sky ([`light`]), until scenes bring theirs. Opacity is

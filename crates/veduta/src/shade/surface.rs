@@ -93,14 +93,15 @@ impl Corners {
         let weights = self.0.map(|weight| weight.at(image).max(0.0));
         let sum: f64 = weights.iter().sum();
         if sum > 0.0 && sum.is_finite() {
-            (weights.map(|weight| weight / sum), 1.0 / sum)
+            let depth = 1.0 / sum;
+            (weights.map(|weight| weight * depth), depth)
         } else {
             ([1.0 / 3.0; 3], 0.0)
         }
     }
 }
 
-/// The frame of mind in which faces are looked at: matrices of all objects.
+/// Looks at the faces of a map from its eye.
 pub struct Viewer<'a> {
     scene: &'a Scene,
     map: &'a VisibilityMap,
@@ -264,6 +265,88 @@ impl Varying {
                     along_y: along(b0.b, b1.b, b2.b),
                 }
             }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOTH: [Projection; 2] = [
+        Projection::Perspective {
+            tan_half_height: 0.4,
+            aspect: 1.5,
+        },
+        Projection::Parallel {
+            height: 3.0,
+            aspect: 1.5,
+        },
+    ];
+
+    fn camera(projection: Projection) -> Camera {
+        Camera {
+            eye_from_world: DMat4::IDENTITY,
+            projection,
+            near: 0.1,
+        }
+    }
+
+    /// Eye-space triangles: before the eye, wound either way, and with corners behind the eye.
+    fn triangles() -> [[DVec3; 3]; 3] {
+        let [a, b, c] = [(-0.7, -0.6, 2.0), (0.9, -0.3, 3.0), (0.1, 0.8, 2.5)].map(DVec3::from);
+        let behind = DVec3::new(0.2, 1.5, -1.0);
+        [[a, b, c], [c, b, a], [a, b, behind]]
+    }
+
+    #[test]
+    fn a_point_of_a_triangle_gets_its_barycentric_coordinates() {
+        for projection in BOTH {
+            let camera = camera(projection);
+            for triangle in triangles() {
+                let corners = Corners::new(&camera, triangle);
+                for expected in [[0.2, 0.5, 0.3], [0.9, 0.05, 0.05], [0.6, 0.35, 0.05]] {
+                    let [v0, v1, v2] = triangle;
+                    let point = v0 * expected[0] + v1 * expected[1] + v2 * expected[2];
+                    assert!(point.z > 0.0);
+                    let (found, _) = corners.at(camera.image_from_eye(point));
+                    let off = DVec3::from(found) - DVec3::from(expected);
+                    assert!(off.length() < 1e-12, "{found:?} and not {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_pixels_footprint_is_the_change_from_pixel_to_pixel() {
+        for projection in BOTH {
+            let camera = camera(projection);
+            for triangle in triangles() {
+                let face = Varying {
+                    material: MaterialId(0),
+                    corners: Corners::new(&camera, triangle),
+                    face_normal: -Vec3::Z,
+                    normals: None,
+                    picture: Some([(0.0, 0.3), (1.0, 0.1), (0.4, 2.0)].map(DVec2::from)),
+                    colors: None,
+                };
+                let at = |p| face.at(p).picture.expect("it has a texture");
+                let [v0, v1, v2] = triangle;
+                let image = camera.image_from_eye(v0 * 0.5 + v1 * 0.3 + v2 * 0.2);
+                let (here, h) = (at(image), 1e-5);
+                let slope = |step: DVec2| (at(image + step).at - at(image - step).at) / (2.0 * h);
+                assert!((here.along_x - slope(DVec2::new(h, 0.0))).length() < 1e-6);
+                assert!((here.along_y - slope(DVec2::new(0.0, h))).length() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn a_triangle_seen_edge_on_is_evaluated_in_its_middle() {
+        for projection in BOTH {
+            let line = [0.0, 1.0, 2.0].map(|t| DVec3::new(t, t, 1.0));
+            let (weights, _) = Corners::new(&camera(projection), line).at(DVec2::new(0.2, 0.7));
+            assert_eq!(weights, [1.0 / 3.0; 3]);
         }
     }
 }

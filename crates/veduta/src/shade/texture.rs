@@ -85,7 +85,7 @@ impl<'a> Pyramid<'a> {
         // Half axes of the ellipse that the unit circle becomes: singular values of (u v).
         let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
         let (mean, difference) = (0.5 * (uu + vv), 0.5 * (uu - vv));
-        let root = difference.hypot(uv);
+        let root = (difference * difference + uv * uv).sqrt();
         let long = (mean + root).sqrt();
         let short = (mean - root).max(0.0).sqrt();
         if long.is_nan() || long <= 1.0 {
@@ -110,7 +110,7 @@ impl<'a> Pyramid<'a> {
     }
 
     fn trilinear(&self, at: DVec2, level: f64, wrap: [Wrap; 2]) -> Vec4 {
-        let below = level.floor().min(self.levels.len() as f64);
+        let below = floor(level).min(self.levels.len() as f64);
         let near = self.bilinear(at, below as usize, wrap);
         let part = (level - below) as f32;
         if part > 0.0 && (below as usize) < self.levels.len() {
@@ -140,20 +140,28 @@ impl<'a> Pyramid<'a> {
     }
 }
 
+/// The largest whole number up to `x`, for numbers that an `i64` holds. [`f64::floor`] is a function
+/// call on processors that Rust builds for by default.
+#[inline(always)]
+fn floor(x: f64) -> f64 {
+    let cut = x as i64 as f64;
+    if cut > x { cut - 1.0 } else { cut }
+}
+
 /// The two texels whose centres lie around coordinate `at` of a side of `size` texels, and how far
 /// from the first to the second it lies.
 fn neighbours(at: f64, size: u32, wrap: Wrap) -> ([u32; 2], f32) {
     let last = f64::from(size) - 1.0;
     let texel = match wrap {
-        Wrap::Repeat => at - at.floor(),
+        Wrap::Repeat => at - floor(at),
         Wrap::Mirror => {
-            let phase = at - 2.0 * (0.5 * at).floor();
+            let phase = at - 2.0 * floor(0.5 * at);
             if phase > 1.0 { 2.0 - phase } else { phase }
         }
         Wrap::Clamp => at.clamp(0.0, 1.0),
     } * f64::from(size)
         - 0.5;
-    let first = texel.floor();
+    let first = floor(texel);
     let pair = match wrap {
         Wrap::Repeat => [
             if first < 0.0 { last } else { first.min(last) },

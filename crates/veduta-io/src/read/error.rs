@@ -1,0 +1,327 @@
+use std::fmt;
+use std::path::PathBuf;
+use veduta::scene::MeshError;
+
+/// Why a scene could not be read: in which file, where in it, and what is wrong there.
+///
+/// Displayed as `file:line: what is wrong; how to mend it`, or `file: place: …` where the place is
+/// not a line.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{place}: {problem}", file.display())]
+pub struct ReadError {
+    /// The file.
+    pub file: PathBuf,
+    /// Where in the file.
+    pub place: Place,
+    /// What is wrong there. Part of the message, therefore not also its `source`.
+    pub problem: Problem,
+}
+
+impl ReadError {
+    /// Who can mend it.
+    pub fn kind(&self) -> ErrorKind {
+        match self.problem {
+            Problem::Unreadable(_) => ErrorKind::InputOutput,
+            Problem::UnknownFormat { .. }
+            | Problem::Version { .. }
+            | Problem::RequiredExtension(_)
+            | Problem::RemoteUri(_) => ErrorKind::Unsupported,
+            Problem::NotThere { .. } | Problem::NoBinChunk => ErrorKind::Missing,
+            _ => ErrorKind::BadInput,
+        }
+    }
+}
+
+/// Who can mend an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// The file is damaged, or breaks the rules of its format.
+    BadInput,
+    /// Something that the file names is not there.
+    Missing,
+    /// The file may be fine, but uses what is not supported here.
+    Unsupported,
+    /// The operating system did not let it be read.
+    InputOutput,
+}
+
+/// A place in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    Whole,
+    /// A line of a text file, counted from 1.
+    Line(u64),
+    /// An offset from the start of a binary file.
+    Byte(u64),
+    /// A path into a JSON document, such as `meshes[3].primitives[0].indices`.
+    Json(String),
+}
+
+impl fmt::Display for Place {
+    /// What follows the file's name in a message.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Whole => Ok(()),
+            Place::Line(line) => write!(f, ":{line}"),
+            Place::Byte(offset) => write!(f, ": byte {offset}"),
+            Place::Json(path) => write!(f, ": {path}"),
+        }
+    }
+}
+
+/// What is wrong at a place of a file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The operating system's word.
+    #[error("cannot be read: {0}")]
+    Unreadable(std::io::Error),
+    /// Neither the suffix nor the first bytes tell what it is.
+    #[error("is of no format that is read here; scenes are read from {known}")]
+    UnknownFormat {
+        /// The suffixes of the formats that are read.
+        known: String,
+    },
+    /// A version of the format that is not read.
+    #[error("is {found}, expected {expected}; convert it with the program that made it")]
+    Version {
+        /// The version found.
+        found: String,
+        /// The versions that are read.
+        expected: &'static str,
+    },
+    /// The bytes end too early.
+    #[error(
+        "{what} needs {needed} bytes, but {present} are there; the file is cut short or damaged"
+    )]
+    Truncated {
+        /// What needs them.
+        what: &'static str,
+        /// How many it needs.
+        needed: u64,
+        /// How many there are.
+        present: u64,
+    },
+    /// The first bytes are not those of the format.
+    #[error("starts with {found:02x?}, which is no {format} file")]
+    WrongMagic {
+        /// The format that the file's name promises.
+        format: &'static str,
+        /// The first bytes.
+        found: Vec<u8>,
+    },
+    /// The JSON does not parse, or not to what glTF asks for.
+    #[error("is not valid glTF: {0}")]
+    Json(String),
+    /// The file says that it cannot be understood without an extension.
+    #[error("the extension {0} is required but not supported; export the model without it")]
+    RequiredExtension(String),
+    /// A file that the file names is not there, or is no file.
+    #[error("names {}, which cannot be read: {source}; put it there or export to .glb", path.display())]
+    NotThere {
+        /// The path that was tried.
+        path: PathBuf,
+        /// Why it could not be read.
+        source: std::io::Error,
+    },
+    /// A buffer without URI, in a file without binary chunk.
+    #[error(
+        "has no uri, and the file has no binary chunk; it needs the .bin file that belongs to it"
+    )]
+    NoBinChunk,
+    /// An address on the network.
+    #[error("{0:?} is not a path to a file; download it and put it beside the model")]
+    RemoteUri(String),
+    /// A `data:` URI that does not decode.
+    #[error("is no valid data URI: {0}")]
+    DataUri(String),
+    /// An index to a row that does not exist.
+    #[error("refers to {what} {index}, but the number of {what}s is {count}")]
+    NoSuch {
+        /// What kind of row.
+        what: &'static str,
+        /// The index found.
+        index: u64,
+        /// Number of rows.
+        count: usize,
+    },
+    /// Something that must be there is not.
+    #[error("has no {0}")]
+    Lacks(&'static str),
+    /// A value outside its legal range.
+    #[error("is {found}, expected {expected}")]
+    Illegal {
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: &'static str,
+    },
+    /// Reading on would take more memory than the input justifies.
+    #[error(
+        "asks for {asked} bytes more of memory, which input of {input} bytes does not justify; \
+         the file is damaged, or repeats the same data too often"
+    )]
+    TooLarge {
+        /// How much was asked for.
+        asked: u64,
+        /// Length of everything read so far.
+        input: u64,
+    },
+    /// A node that contains itself.
+    #[error("is its own descendant; nodes must form a tree")]
+    Cycle,
+    /// A node that is reached twice.
+    #[error("node {node} has a parent already, {parent}; a node may be placed once")]
+    PlacedTwice {
+        /// The node.
+        node: usize,
+        /// Who placed it first.
+        parent: String,
+    },
+    /// An index of a face or triangle past the vertices.
+    #[error("index {at} is {index}, but the number of vertices is {vertices}")]
+    IndexOutOfRange {
+        /// Which index of the accessor.
+        at: usize,
+        /// Its value.
+        index: u32,
+        /// Number of vertices.
+        vertices: u64,
+    },
+    /// A vertex that is placed out of this world.
+    #[error(
+        "{what} reaches {reach:e} m from the origin, expected less than {limit:e} m; mend its coordinates or transform"
+    )]
+    TooFar {
+        /// The object.
+        what: String,
+        /// How far.
+        reach: f64,
+        /// How far is allowed.
+        limit: f64,
+    },
+    /// A token of a text file that is not what is expected there.
+    #[error("{found:?} where {expected} is expected")]
+    Token {
+        /// The token, shortened.
+        found: String,
+        /// What should stand there.
+        expected: &'static str,
+    },
+    /// A reference of an OBJ face to an element that was not given before it.
+    #[error("refers to {what} {index}, but {count} stand before it")]
+    NoSuchBefore {
+        /// `vertex`, `texture coordinate` or `normal`.
+        what: &'static str,
+        /// The reference as written: from 1, or negative from the last.
+        index: i64,
+        /// How many were given before.
+        count: usize,
+    },
+    /// A face with too few or too many corners.
+    #[error("a face with {found} corners, expected 3 to {most}")]
+    Corners {
+        /// Number of corners.
+        found: usize,
+        /// The most that are read.
+        most: usize,
+    },
+    /// The mesh that was read is unsound.
+    #[error("mesh {name:?}: {fault}; export the model anew")]
+    Mesh {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        fault: MeshError,
+    },
+}
+
+impl Problem {
+    /// Says at which place.
+    pub(crate) fn at(self, place: Place) -> Fault {
+        Fault {
+            place,
+            problem: self,
+        }
+    }
+
+    /// Says at which path of the JSON document.
+    #[cfg(feature = "gltf")]
+    pub(crate) fn at_json(self, path: impl Into<String>) -> Fault {
+        self.at(Place::Json(path.into()))
+    }
+}
+
+/// A [`ReadError`] that has not yet been told its file.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub place: Place,
+    pub problem: Problem,
+}
+
+/// Something that was read otherwise than the file asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// The file.
+    pub file: PathBuf,
+    /// Where in the file.
+    pub place: Place,
+    /// What was found, and what was made of it.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}: {}", self.file.display(), self.place, self.message)
+    }
+}
+
+/// Collects the warnings of one file, so many that a person may still read them.
+#[derive(Debug)]
+pub(crate) struct Warnings {
+    file: PathBuf,
+    rows: Vec<Warning>,
+    left_out: usize,
+}
+
+/// More warnings than this about one file help nobody.
+const MOST_WARNINGS: usize = 40;
+
+impl Warnings {
+    pub fn new(file: PathBuf) -> Self {
+        Self {
+            file,
+            rows: Vec::new(),
+            left_out: 0,
+        }
+    }
+
+    pub fn add(&mut self, place: Place, message: impl Into<String>) {
+        self.add_in(self.file.clone(), place, message);
+    }
+
+    /// Adds a warning about a file that belongs to this one.
+    pub fn add_in(&mut self, file: PathBuf, place: Place, message: impl Into<String>) {
+        if self.rows.len() < MOST_WARNINGS {
+            self.rows.push(Warning {
+                file,
+                place,
+                message: message.into(),
+            });
+        } else {
+            self.left_out += 1;
+        }
+    }
+
+    pub fn finish(mut self) -> Vec<Warning> {
+        if self.left_out > 0 {
+            self.rows.push(Warning {
+                file: self.file,
+                place: Place::Whole,
+                message: format!("{} more warnings of such kinds are left out", self.left_out),
+            });
+        }
+        self.rows
+    }
+}

@@ -1,0 +1,136 @@
+//! Files of other programs -> a scene.
+//!
+//! [`read_scene`] chooses the reader by the file's suffix or first bytes. A reader turns bytes to
+//! meshes, materials, pictures, cameras and a list of placed objects in the file's own axes. What
+//! all formats share stands beside the readers: `finish` checks the meshes and turns the world so
+//! that Z is up, `picture` decodes textures, `budget` bounds memory.
+
+mod budget;
+mod error;
+#[cfg(any(feature = "gltf", feature = "obj"))]
+mod files;
+mod finish;
+#[cfg(feature = "gltf")]
+mod gltf;
+#[cfg(any(feature = "gltf", feature = "obj"))]
+mod names;
+#[cfg(feature = "obj")]
+mod obj;
+#[cfg(any(feature = "gltf", feature = "obj"))]
+mod picture;
+
+pub use error::{ErrorKind, Place, Problem, ReadError, Warning};
+
+use budget::Budget;
+use error::{Fault, Warnings};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use veduta::scene::Scene;
+
+/// The axis of a file that points upwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UpAxis {
+    /// Y is up and Z comes to the front: the rule of glTF, and the habit of OBJ.
+    Y,
+    /// Z is up, as in the world: nothing is turned.
+    Z,
+}
+
+/// How to read a scene.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReadOptions {
+    /// The axis that points upwards; `None` for what is usual in the format.
+    pub up_axis: Option<UpAxis>,
+}
+
+/// A scene, and what was read otherwise than the file asks for.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The scene; all its meshes are sound.
+    pub scene: Scene,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// Suffixes of the files that [`read_scene`] reads.
+pub const SCENE_SUFFIXES: &[&str] = &[
+    #[cfg(feature = "gltf")]
+    "glb",
+    #[cfg(feature = "gltf")]
+    "gltf",
+    #[cfg(feature = "obj")]
+    "obj",
+];
+
+/// Reads a scene from a file and the files it names.
+///
+/// Object names are unique paths, joined by `/`, and objects stand in the order of the file's
+/// tree. The world has Z up, and the front of a model with Y up faces -Y.
+///
+/// # Errors
+/// When the file cannot be read, is damaged, or needs what is not supported. Never panics.
+pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
+    let mut warnings = Warnings::new(path.to_owned());
+    let scene = read(path, options, &mut warnings).map_err(|fault| ReadError {
+        file: path.to_owned(),
+        place: fault.place,
+        problem: fault.problem,
+    })?;
+    Ok(Loaded {
+        scene,
+        warnings: warnings.finish(),
+    })
+}
+
+/// The formats, by suffix.
+enum Format {
+    #[cfg(feature = "gltf")]
+    Gltf,
+    #[cfg(feature = "obj")]
+    Obj,
+}
+
+impl Format {
+    /// By suffix; without a telling one, by the first bytes.
+    fn of(path: &Path) -> Result<Option<Self>, Problem> {
+        let suffix = path.extension().unwrap_or_default().to_ascii_lowercase();
+        match suffix.to_str() {
+            #[cfg(feature = "gltf")]
+            Some("glb" | "gltf") => return Ok(Some(Self::Gltf)),
+            #[cfg(feature = "obj")]
+            Some("obj") => return Ok(Some(Self::Obj)),
+            _ => {}
+        }
+        let mut start = Vec::new();
+        File::open(path)
+            .and_then(|file| file.take(4).read_to_end(&mut start))
+            .map_err(Problem::Unreadable)?;
+        Ok(match start.as_slice() {
+            #[cfg(feature = "gltf")]
+            gltf::MAGIC => Some(Self::Gltf),
+            _ => None,
+        })
+    }
+}
+
+fn read(path: &Path, options: &ReadOptions, warnings: &mut Warnings) -> Result<Scene, Fault> {
+    let whole = |problem: Problem| problem.at(Place::Whole);
+    let Some(format) = Format::of(path).map_err(whole)? else {
+        let known: Vec<_> = SCENE_SUFFIXES.iter().map(|s| format!(".{s}")).collect();
+        let known = known.join(", ");
+        return Err(whole(Problem::UnknownFormat { known }));
+    };
+    let bytes = std::fs::read(path).map_err(|error| whole(Problem::Unreadable(error)))?;
+    let mut budget = Budget::new();
+    budget.add_input(bytes.len());
+    let mut scene = match format {
+        #[cfg(feature = "gltf")]
+        Format::Gltf => gltf::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "obj")]
+        Format::Obj => obj::read(path, &bytes, &mut budget, warnings)?,
+    };
+    finish::turn_up(&mut scene, options.up_axis.unwrap_or(UpAxis::Y));
+    finish::check_reach(&scene).map_err(whole)?;
+    Ok(scene)
+}
