@@ -5,7 +5,9 @@
 //! code gets. Multiscan is part of the library.
 
 pub mod cases;
+pub mod exchange;
 pub mod fit;
+pub mod peers;
 pub mod table;
 pub mod timing;
 pub mod zbuffer;
