@@ -7,6 +7,7 @@
 pub mod cases;
 pub mod exchange;
 pub mod fit;
+pub mod glb;
 pub mod peers;
 pub mod table;
 pub mod timing;

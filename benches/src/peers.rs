@@ -3,6 +3,7 @@
 
 use crate::cases::Case;
 use crate::exchange::Exchange;
+use crate::glb;
 use crate::timing::{least_times, on_one_thread};
 use crate::zbuffer::ZBuffer;
 use cpu_time::ThreadTime;
@@ -12,24 +13,37 @@ use std::path::Path;
 use std::time::Duration;
 use veduta::accumulate::Picture;
 use veduta::dice::{PixelGrid, coverage};
+use veduta::geometry::{DMat4, DVec4};
+use veduta::map::Camera;
 use veduta::pipeline::{RenderSettings, find_visibility, render_map};
+use veduta::scene::Scene;
 use veduta::visibility::{project, speculative};
-use veduta_io::{PictureOptions, write_picture};
+use veduta_io::{PictureOptions, ReadOptions, read_scene, write_picture};
 
 /// Rounds of measuring our own times.
 const ROUNDS: u32 = 9;
 
-/// Writes `case` for the other programs to read, see [`Exchange`].
+/// Writes `case` for the other programs to read, see [`Exchange`]; as binary glTF if `path` ends in
+/// `.glb`.
 ///
 /// # Errors
 /// When the file cannot be written.
 pub fn export(case: &Case, path: &Path) -> Result<(), String> {
     let write = || {
         let mut out = BufWriter::new(File::create(path)?);
-        Exchange::new(case).write(&mut out)?;
+        let scene = Exchange::new(case);
+        if is_glb(path) {
+            glb::write(&scene, &mut out)?;
+        } else {
+            scene.write(&mut out)?;
+        }
         out.flush()
     };
     write().map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn is_glb(path: &Path) -> bool {
+    path.extension().is_some_and(|suffix| suffix == "glb")
 }
 
 /// Writes the exact picture of `case` in flat colours: areas and sums in f64, rounded to f32 at the
@@ -59,23 +73,29 @@ pub fn reference(case: &Case, path: &Path) -> Result<(), String> {
 
 /// Our own CPU times as a line of JSON, and the picture written.
 ///
-/// `file` is what [`export`] wrote of `case`: "load" is the time to read it, with the scene made
-/// ready for projection. "render" is the sum of "project", "map" and "pixels". "zbuffer" is the
+/// `file` is what [`export`] wrote of `case`, in either format: "load" is the time to read it, with
+/// the scene made ready for projection. "render" is the sum of "project", "map" and "pixels". "zbuffer" is the
 /// depth buffer of this crate from projected faces on.
 ///
 /// # Errors
 /// When a file cannot be read or written.
 pub fn own_times(case: &Case, file: &Path, picture: &Path) -> Result<String, String> {
-    let load = || -> Result<_, String> {
-        let start = ThreadTime::now();
-        let bytes = fs::read(file).map_err(|error| error.to_string())?;
-        let scene = Exchange::read(&bytes)?.scene();
-        Ok((scene, start.elapsed()))
+    let load = || {
+        on_one_thread(|| {
+            let start = ThreadTime::now();
+            read(file).map(|scene| (scene, start.elapsed()))
+        })
     };
-    let (scene, mut load_time) = load().map_err(|error| format!("{}: {error}", file.display()))?;
-    // The file is in eye space.
-    let mut camera = case.camera;
-    camera.eye_from_world = veduta::geometry::DMat4::IDENTITY;
+    let (scene, mut load_time) = load()?;
+    // The file is in eye space; a reader of models has turned it to have z up.
+    let camera = Camera {
+        eye_from_world: if is_glb(file) {
+            EYE_FROM_Z_UP
+        } else {
+            DMat4::IDENTITY
+        },
+        ..case.camera
+    };
 
     let settings = RenderSettings {
         width: case.width,
@@ -111,8 +131,7 @@ pub fn own_times(case: &Case, file: &Path, picture: &Path) -> Result<String, Str
     });
     // Twice more: the first read may have met a cold disk.
     for _ in 0..2 {
-        let (_, time) = load().map_err(|error| format!("{}: {error}", file.display()))?;
-        load_time = load_time.min(time);
+        load_time = load_time.min(load()?.1);
     }
     let [load, project, map_seconds, pixels, zbuffer] =
         [load_time, project_time, map_time, pixel_time, zbuffer_time]
@@ -123,6 +142,24 @@ pub fn own_times(case: &Case, file: &Path, picture: &Path) -> Result<String, Str
         map.faces.len(),
         project + map_seconds + pixels,
     ))
+}
+
+/// Eye space (x right, y down, z forward) from the world of a camera at the origin that looks along
+/// +Y, with Z up.
+const EYE_FROM_Z_UP: DMat4 = DMat4::from_cols(DVec4::X, DVec4::Z, DVec4::NEG_Y, DVec4::W);
+
+fn read(file: &Path) -> Result<Scene, String> {
+    if is_glb(file) {
+        let loaded = read_scene(file, &ReadOptions::default());
+        return loaded
+            .map(|loaded| loaded.scene)
+            .map_err(|error| error.to_string());
+    }
+    fs::read(file)
+        .map_err(|error| error.to_string())
+        .and_then(|bytes| Exchange::read(&bytes))
+        .map(|exchange| exchange.scene())
+        .map_err(|error| format!("{}: {error}", file.display()))
 }
 
 fn write(path: &Path, picture: &Picture) -> Result<(), String> {
