@@ -133,8 +133,7 @@ class Sampled:
         failed = 0
         for n in LADDER:
             if n not in self.errors:
-                expected = max((t * (n / m) ** 2 for m, t in self.times.items()), default=0)
-                if expected > patience and len(self.errors) >= 4:
+                if self.expected(n) > patience and len(self.errors) >= 4:
                     return self.extrapolated(goal), True
                 self.measure(n, folder)
             if reached(n):
@@ -163,12 +162,15 @@ class Sampled:
             return math.inf
         return max(last[-1], math.exp((math.log(GOALS[goal]) - intercept) / slope))
 
-    def seconds(self, n):
-        """CPU seconds with n x n samples, scaled from the largest n that was run if need be."""
-        if n in self.times:
-            return self.times[n]
+    def expected(self, n):
+        """CPU seconds with n x n samples, in proportion to the largest n that was run."""
+        if not self.times:
+            return 0.0
         largest = max(self.times)
         return self.times[largest] * (n / largest) ** 2
+
+    def seconds(self, n):
+        return self.times[n] if n in self.times else self.expected(n)
 
 
 def error_between(exact, picture):
@@ -214,8 +216,7 @@ def proof(sampled, patience, folder):
     options = ["--half"] if sampled.rival.has_tiles else []
     best = (math.inf, 0)
     for n in (16, 32, 64, 128):
-        expected = max((t * (n / m) ** 2 for m, t in sampled.times.items()), default=0)
-        if best[0] < PROVED or expected > 2 * patience:
+        if best[0] < PROVED or (n > 16 and sampled.expected(n) > 2 * patience):
             break
         best = min(best, (sampled.draw(n, *options, folder=folder)[1]["rmse"], n))
     return best

@@ -1,8 +1,10 @@
 //! Scenes to measure on, projected once: what an engine costs begins after projection.
 
-use veduta::map::{Camera, FaceId, Faces};
+use veduta::accumulate::Picture;
+use veduta::map::{Camera, FaceId, Faces, Fragments, VisibilityMap};
+use veduta::pipeline::{RenderSettings, render_map};
 use veduta::scene::{Scene, generate};
-use veduta::visibility::project;
+use veduta::visibility::{Seen, project, speculative};
 
 /// A scene at a picture's size.
 pub struct Case {
@@ -83,6 +85,47 @@ impl Case {
         self.colors[face.index()]
     }
 
+    /// The exact engine's work.
+    pub fn find_exactly(&self) -> Seen {
+        let settings = speculative::Settings {
+            aspect: f64::from(self.width) / f64::from(self.height),
+            ..speculative::Settings::default()
+        };
+        speculative::find(&self.faces, &settings)
+    }
+
+    /// A map of the case's faces in which nothing has been found yet.
+    pub fn empty_map(&self) -> VisibilityMap {
+        VisibilityMap {
+            camera: self.camera,
+            faces: self.faces.clone(),
+            opaque: Fragments::default(),
+            veils: Fragments::default(),
+        }
+    }
+
+    /// A picture of the case's size in which nothing has been drawn yet.
+    pub fn empty_picture(&self) -> Picture {
+        Picture {
+            width: self.width,
+            height: self.height,
+            pixels: vec![[0.0; 4]; self.width as usize * self.height as usize],
+        }
+    }
+
+    /// Fills `map`, made by [`Case::empty_map`], and makes its picture.
+    pub fn picture_exactly(&self, map: &mut VisibilityMap) -> Picture {
+        let Seen { opaque, veils } = self.find_exactly();
+        (map.opaque, map.veils) = (opaque, veils);
+        let settings = RenderSettings {
+            width: self.width,
+            height: self.height,
+            unlit: true,
+            ..RenderSettings::default()
+        };
+        render_map(&self.scene, map, &settings)
+    }
+
     /// Name and size, as [`Case::parse`] reads them.
     pub fn title(&self) -> String {
         format!("{}@{}x{}", self.name, self.width, self.height)
@@ -92,6 +135,8 @@ impl Case {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::zbuffer::ZBuffer;
+    use veduta::visibility::multiscan;
 
     #[test]
     fn a_case_reads_its_own_title() {
@@ -101,6 +146,32 @@ mod tests {
             Case::parse("radial").expect("a name").title(),
             "radial@512x512"
         );
+    }
+
+    #[test]
+    fn all_methods_make_the_same_picture() {
+        for title in ["buildings@96x64", "pierce@96x64", "radial@96x96"] {
+            let case = Case::parse(title).expect("a sound title");
+            let exact = case.picture_exactly(&mut case.empty_map());
+            let spans = multiscan::find_spans(&case.faces, case.width, case.height, 128);
+            let scanned = spans.picture(|face| case.color(face));
+            let mut buffer = ZBuffer::new(32 * case.width, 32 * case.height);
+            buffer.find(&case.faces);
+            let mut sampled = case.empty_picture();
+            buffer.resolve(32, |face| case.color(face), &mut sampled);
+            // An edge along the rows is off by half a sub-scanline, or half a row of samples.
+            for (method, picture, bound) in
+                [("multiscan", scanned, 0.006), ("samples", sampled, 0.03)]
+            {
+                for (index, (a, b)) in exact.pixels.iter().zip(&picture.pixels).enumerate() {
+                    let off = (0..4).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
+                    assert!(
+                        off < bound,
+                        "{title}, {method}, pixel {index}: {a:?} and {b:?}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -3,9 +3,12 @@
 //! CPU time of one thread, the least of several rounds in which the methods take turns, from
 //! projected faces on.
 
+use std::hint::black_box;
 use std::path::Path;
 use std::process::ExitCode;
-use veduta::visibility::{multiscan, speculative};
+use veduta::accumulate::Picture;
+use veduta::map::VisibilityMap;
+use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
 use veduta_bench::fit::Line;
 use veduta_bench::peers;
@@ -20,10 +23,12 @@ Usage: veduta-bench TABLE [SCENE[@WIDTHxHEIGHT]...]
        veduta-bench own SCENE[@WIDTHxHEIGHT] EXPORTED_FILE PICTURE.npy
 
 Tables:
-  n-et      multiscan by its number of sub-scanlines, and how many of them cost as much as
-            the exact map (Tanaka & Takahashi 1991, table 1)
-  zbuffer   the exact map against a z-buffer with one sample a pixel
-  engines   all methods to pixels, supersampling included
+  n-et      multiscan with n sub-scanlines, the slope and intercept of its time over n, and
+            the n that costs as much as the exact picture (Tanaka & Takahashi 1991, table 1)
+  zbuffer   the exact map, and picture, against a z-buffer with one sample a pixel
+  engines   all methods, supersampling included
+
+Columns: map is the exact map alone, exact the map and its pixels.
 
 Without scenes, those that the documentation tells of.
 
@@ -33,7 +38,7 @@ For benches/peers:
   own        our CPU seconds to that picture, as JSON";
 
 /// Rounds of measuring, for scenes that do not take long.
-const ROUNDS: u32 = 7;
+const ROUNDS: u32 = 5;
 
 /// A table: what it tells of each scene, and of which scenes unless told.
 struct Measurement {
@@ -54,10 +59,11 @@ const MEASUREMENTS: [Measurement; 3] = [
             "n = 4",
             "n = 8",
             "n = 16",
-            "each",
-            "none",
+            "slope",
+            "intercept",
             "map",
-            "map = n",
+            "exact",
+            "= n",
         ],
         row: sub_scanlines,
     },
@@ -77,7 +83,16 @@ const MEASUREMENTS: [Measurement; 3] = [
             "pierce@512x512",
             "balls7@512x512",
         ],
-        titles: &["scene, ms", "faces", "z-buffer", "map", "ratio"],
+        titles: &[
+            "scene, ms",
+            "faces",
+            "z-buffer",
+            "map",
+            "ratio",
+            "with pixels",
+            "exact",
+            "ratio",
+        ],
         row: against_zbuffer,
     },
     Measurement {
@@ -101,6 +116,7 @@ const MEASUREMENTS: [Measurement; 3] = [
             "multiscan 4",
             "multiscan 8",
             "map",
+            "exact",
         ],
         row: engines,
     },
@@ -162,19 +178,17 @@ fn print_table(name: &str, scenes: &[String]) -> Result<(), String> {
 }
 
 /// Multiscan to pixels with 1, 2, 4, 8 and 16 sub-scanlines; the line through these times; the n at
-/// which it meets the exact map's. (The paper counts inserted sub-scanlines, one less than n.)
+/// which it meets the exact picture's. (The paper counts inserted sub-scanlines, one less than n.)
 fn sub_scanlines(case: &Case) -> Vec<String> {
     const COUNTS: [u32; 5] = [1, 2, 4, 8, 16];
-    let scan = |n| {
-        move || {
-            multiscan_picture(case, n);
-        }
-    };
+    let scan = |n| move || multiscan_picture(case, n);
     let [mut n1, mut n2, mut n4, mut n8, mut n16] = COUNTS.map(scan);
-    let [map, scans @ ..] = least_times(
+    let mut map = case.empty_map();
+    let [find, exact, scans @ ..] = least_times(
         ROUNDS,
         [
             &mut || exact_map(case),
+            &mut || exact_picture(case, &mut map),
             &mut n1,
             &mut n2,
             &mut n4,
@@ -187,43 +201,54 @@ fn sub_scanlines(case: &Case) -> Vec<String> {
     let line = Line::through(&points);
     let mut row = vec![case.title()];
     row.extend(scans.map(ms));
-    row.extend([line.slope, line.intercept, map].map(ms));
-    row.push(format!("{:.1}", line.x_of(map)));
+    row.extend([line.slope, line.intercept, find, exact].map(ms));
+    row.push(format!("{:.1}", line.x_of(exact)));
     row
 }
 
-/// The exact map and the z-buffer.
+/// The z-buffer and the exact map; both to pixels.
 fn against_zbuffer(case: &Case) -> Vec<String> {
     let mut buffer = ZBuffer::new(case.width, case.height);
-    let [z, map] = least_times(
+    let mut sampling = Supersampling::new(case, 1);
+    let mut map = case.empty_map();
+    let [z, find, z_picture, exact] = least_times(
         ROUNDS,
-        [&mut || buffer.find(&case.faces), &mut || exact_map(case)],
+        [
+            &mut || buffer.find(&case.faces),
+            &mut || exact_map(case),
+            &mut || sampling.run(case),
+            &mut || exact_picture(case, &mut map),
+        ],
     )
     .map(milliseconds);
     vec![
         case.title(),
         case.faces.len().to_string(),
         ms(z),
-        ms(map),
-        format!("{:.1}", map / z),
+        ms(find),
+        format!("{:.1}", find / z),
+        ms(z_picture),
+        ms(exact),
+        format!("{:.1}", exact / z_picture),
     ]
 }
 
 /// All methods.
 fn engines(case: &Case) -> Vec<String> {
     let mut buffer = ZBuffer::new(case.width, case.height);
-    let mut resolved = ZBuffer::new(case.width, case.height);
-    let [mut fours, mut eights] = [4, 8].map(|n| ZBuffer::new(n * case.width, n * case.height));
+    let [mut one, mut four, mut eight] = [1, 4, 8].map(|n| Supersampling::new(case, n));
+    let mut map = case.empty_map();
     let times = least_times(
         ROUNDS,
         [
             &mut || buffer.find(&case.faces),
-            &mut || supersample(case, &mut resolved, 1),
-            &mut || supersample(case, &mut fours, 4),
-            &mut || supersample(case, &mut eights, 8),
+            &mut || one.run(case),
+            &mut || four.run(case),
+            &mut || eight.run(case),
             &mut || multiscan_picture(case, 4),
             &mut || multiscan_picture(case, 8),
             &mut || exact_map(case),
+            &mut || exact_picture(case, &mut map),
         ],
     );
     let mut row = vec![case.title()];
@@ -232,21 +257,42 @@ fn engines(case: &Case) -> Vec<String> {
 }
 
 fn exact_map(case: &Case) {
-    let settings = speculative::Settings {
-        aspect: f64::from(case.width) / f64::from(case.height),
-        ..speculative::Settings::default()
-    };
-    std::hint::black_box(speculative::find(&case.faces, &settings));
+    black_box(case.find_exactly());
+}
+
+/// Finds what is seen, puts it into `map`, which has the case's faces, and makes the picture.
+fn exact_picture(case: &Case, map: &mut VisibilityMap) {
+    black_box(case.picture_exactly(map));
 }
 
 fn multiscan_picture(case: &Case, n: u32) {
     let spans = multiscan::find_spans(&case.faces, case.width, case.height, n);
-    std::hint::black_box(spans.picture(|face| case.color(face)));
+    black_box(spans.picture(|face| case.color(face)));
 }
 
-fn supersample(case: &Case, buffer: &mut ZBuffer, n: usize) {
-    buffer.find(&case.faces);
-    std::hint::black_box(buffer.resolve(n, |face| case.color(face)));
+/// A z-buffer with `n` x `n` samples for each pixel, and the picture made of it.
+struct Supersampling {
+    n: u32,
+    buffer: ZBuffer,
+    picture: Picture,
+}
+
+impl Supersampling {
+    fn new(case: &Case, n: u32) -> Self {
+        Self {
+            n,
+            buffer: ZBuffer::new(n * case.width, n * case.height),
+            picture: case.empty_picture(),
+        }
+    }
+
+    fn run(&mut self, case: &Case) {
+        self.buffer.find(&case.faces);
+        let color = |face| case.color(face);
+        self.buffer
+            .resolve(self.n as usize, color, &mut self.picture);
+        black_box(&self.picture);
+    }
 }
 
 /// Three digits or more, as the spread allows no others.

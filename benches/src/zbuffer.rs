@@ -46,11 +46,13 @@ impl ZBuffer {
         (face != BACKGROUND).then_some(face)
     }
 
-    /// The picture in which each pixel is the mean of `n` x `n` samples (linear, premultiplied).
+    /// Makes `picture` the one in which each pixel is the mean of `n` x `n` samples (linear,
+    /// premultiplied). Its memory is used again: getting that of a large picture from the system
+    /// can take longer than all else here.
     ///
     /// # Panics
     /// If `n` does not divide the width and height of the buffer.
-    pub fn resolve(&self, n: usize, color: impl Fn(FaceId) -> [f32; 4]) -> Picture {
+    pub fn resolve(&self, n: usize, color: impl Fn(FaceId) -> [f32; 4], picture: &mut Picture) {
         assert!(
             n > 0 && self.width.is_multiple_of(n) && self.height.is_multiple_of(n),
             "{} x {} samples are not pixels of {n} x {n}",
@@ -58,10 +60,12 @@ impl ZBuffer {
             self.height
         );
         let (width, height) = (self.width / n, self.height / n);
-        let mut pixels = vec![[0.0; 4]; width * height];
+        (picture.width, picture.height) = (width as u32, height as u32);
+        picture.pixels.clear();
+        picture.pixels.resize(width * height, [0.0; 4]);
         let weight = 1.0 / (n * n) as f32;
         for (row, samples) in self.faces.chunks_exact(self.width).enumerate() {
-            let pixels = &mut pixels[row / n * width..][..width];
+            let pixels = &mut picture.pixels[row / n * width..][..width];
             for (pixel, samples) in pixels.iter_mut().zip(samples.chunks_exact(n)) {
                 for &face in samples.iter().filter(|face| **face != BACKGROUND) {
                     for (sum, value) in pixel.iter_mut().zip(color(face)) {
@@ -69,11 +73,6 @@ impl ZBuffer {
                     }
                 }
             }
-        }
-        Picture {
-            width: width as u32,
-            height: height as u32,
-            pixels,
         }
     }
 
@@ -220,7 +219,12 @@ mod tests {
             .sum();
         let mut buffer = ZBuffer::new(512, 512);
         buffer.find(&faces);
-        let picture = buffer.resolve(16, |_| [1.0; 4]);
+        let mut picture = Picture {
+            width: 0,
+            height: 0,
+            pixels: Vec::new(),
+        };
+        buffer.resolve(16, |_| [1.0; 4], &mut picture);
         let mean = picture
             .pixels
             .iter()

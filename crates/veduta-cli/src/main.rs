@@ -1,2 +1,126 @@
-//! The `veduta` command.
-fn main() {}
+//! The `veduta` command: arguments -> settings -> library calls -> messages.
+//!
+//! A file for each verb, in `verb/`. Data goes to stdout, talk to stderr; how it ends is in `exit`.
+
+mod exit;
+mod talk;
+mod values;
+mod verb;
+
+use clap::{Args, Parser, Subcommand};
+use exit::{Code, Failure};
+use std::num::NonZeroUsize;
+use std::panic::{self, AssertUnwindSafe};
+use std::process::ExitCode;
+use talk::{ProgressStyle, Talk, say_error};
+
+/// Pictures of 3D scenes with exactly antialiased edges.
+#[derive(Debug, Parser)]
+#[command(name = "veduta", version, arg_required_else_help = true, after_help = EXIT_CODES)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+    #[command(flatten)]
+    common: Common,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 fine, 2 usage, 3 something named is missing, 4 bad input, \
+    5 not supported, 6 input/output, 70 a fault of veduta itself, 130 interrupted.";
+
+/// What all verbs understand.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Common options")]
+struct Common {
+    /// Tell what was done as JSON on stdout
+    #[arg(long, global = true)]
+    json: bool,
+    /// Number of threads; as many as processors by default. Results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// How to show progress on stderr
+    #[arg(
+        long,
+        global = true,
+        value_name = "STYLE",
+        default_value = "auto",
+        hide_default_value = true
+    )]
+    progress: ProgressStyle,
+    /// No warnings
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say how long each step takes
+    #[arg(short, long, global = true)]
+    verbose: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Render(Box<verb::render::Render>),
+    Info(verb::info::Info),
+}
+
+fn main() -> ExitCode {
+    set_panic_message();
+    // Partial output is removed on Ctrl-C. Without the handler the files would stay; not having it
+    // is no reason not to work.
+    let _ = ctrlc::set_handler(|| {
+        veduta_io::remove_unfinished();
+        std::process::exit(Code::Interrupted as i32);
+    });
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) if error.use_stderr() => {
+            eprint!("veduta: {}", error.render());
+            return ExitCode::from(Code::Usage as u8);
+        }
+        // Help or version were asked for.
+        Err(text) => {
+            return end(talk::print(&text.render().to_string()));
+        }
+    };
+    match panic::catch_unwind(AssertUnwindSafe(|| run(arguments))) {
+        Ok(result) => end(result),
+        // The hook has told it already.
+        Err(_) => ExitCode::from(Code::Internal as u8),
+    }
+}
+
+fn run(arguments: Arguments) -> Result<(), Failure> {
+    let common = &arguments.common;
+    if let Some(threads) = common.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get());
+        let started = pool.build_global();
+        started.map_err(|error| Failure::new(Code::InputOutput, format!("threads: {error}")))?;
+    }
+    let mut talk = Talk::new(common.quiet, common.verbose, common.progress);
+    match &arguments.verb {
+        Verb::Render(render) => render.run(common.json, &mut talk),
+        Verb::Info(info) => info.run(common.json, &mut talk),
+    }
+}
+
+fn end(result: Result<(), Failure>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            say_error(&failure);
+            ExitCode::from(failure.code as u8)
+        }
+    }
+}
+
+/// A panic is a fault of ours: says so, and asks for a report, instead of the raw message.
+fn set_panic_message() {
+    panic::set_hook(Box::new(|panic| {
+        let place = panic
+            .location()
+            .map_or_else(String::new, |place| format!(" at {place}"));
+        let message = panic.payload_as_str().unwrap_or("no message");
+        say_error(format_args!(
+            "internal error{place}: {message}; this is a fault of veduta: please report it, with \
+             the command line and the input, at {}/issues",
+            env!("CARGO_PKG_REPOSITORY")
+        ));
+    }));
+}

@@ -130,36 +130,39 @@ impl Fragments {
         }
     }
 
-    /// The fragments of all `parts`, one after the other.
+    /// Fragments from their columns: `(face, first vertex)` of each, then all vertices and sides.
     ///
     /// # Panics
-    /// If they have more than `u32::MAX` vertices; in debug builds, if faces do not ascend.
-    pub fn concat(parts: &[&Fragments]) -> Self {
-        let count = |rows: fn(&Fragments) -> usize| parts.iter().map(|part| rows(part)).sum();
-        let mut all = Self {
-            entries: Vec::with_capacity(count(|part| part.entries.len())),
-            vertices: Vec::with_capacity(count(|part| part.vertices.len())),
-            sides: Vec::with_capacity(count(|part| part.sides.len())),
-        };
-        u32::try_from(all.vertices.capacity()).expect("at most u32::MAX vertices");
-        for part in parts {
-            debug_assert!(
-                all.entries
-                    .last()
-                    .zip(part.entries.first())
-                    .is_none_or(|(a, b)| a.0 <= b.0),
-                "faces ascend"
+    /// If the columns do not fit: faces or vertices do not ascend, `sides` is not as long as
+    /// `vertices`, or a cut fragment has fewer than three vertices.
+    pub fn from_columns(
+        entries: Vec<(FaceId, u32)>,
+        vertices: Vec<DVec2>,
+        sides: Vec<Side>,
+    ) -> Self {
+        assert_eq!(vertices.len(), sides.len(), "a side for each vertex");
+        let count = u32::try_from(vertices.len()).expect("at most u32::MAX vertices");
+        let after = entries
+            .iter()
+            .skip(1)
+            .copied()
+            .chain([(FaceId(u32::MAX), count)]);
+        for (&(face, start), (next_face, next_start)) in entries.iter().zip(after) {
+            let fits = match next_start.checked_sub(start) {
+                Some(0) => face < next_face,
+                Some(corners) => corners >= 3 && face <= next_face,
+                None => false,
+            };
+            assert!(
+                fits,
+                "fragments of {face:?} do not fit: vertices {start}..{next_start}"
             );
-            let first = all.vertices.len() as u32;
-            all.entries.extend(
-                part.entries
-                    .iter()
-                    .map(|&(face, start)| (face, start + first)),
-            );
-            all.vertices.extend_from_slice(&part.vertices);
-            all.sides.extend_from_slice(&part.sides);
         }
-        all
+        Self {
+            entries,
+            vertices,
+            sides,
+        }
     }
 
     /// Number of fragments.

@@ -7,6 +7,7 @@ mod support;
 
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 use support::coverage::{self, largest_difference};
 use support::samples;
 use support::scenes::{LARGE, Scene};
@@ -15,26 +16,47 @@ use veduta::map::{Camera, Faces, Fragment, Projection, Side, VisibilityMap};
 use veduta::visibility::speculative::{self, Report};
 use veduta::visibility::{Seen, cross_scanline};
 
-/// A way to find visibility, and its name.
-type Engine = (&'static str, fn(&Scene) -> (Seen, Report));
+/// A way to find visibility.
+struct Engine {
+    name: &'static str,
+    find: fn(&Scene) -> (Seen, Report),
+    /// Of the scenes with more than 5,000 faces it is tried on one in this many, to save time.
+    large_scenes: u64,
+}
 
 /// The engines under test. They are compared with the first one, which cuts the frame into a strip
 /// for each row of pixels, like the paper.
 const ENGINES: [Engine; 6] = [
-    ("sweep, a strip for each row", |scene| {
-        sweep(&scene.faces, scene.height)
-    }),
-    ("sweep, strips of three and a half rows", |scene| {
-        sweep(&scene.faces, scene.height * 2 / 7)
-    }),
-    ("sweep, strips out of step with the rows", |scene| {
-        sweep(&scene.faces, 7)
-    }),
-    ("clip without a guess", |scene| clip(scene, false, None)),
-    ("speculative", |scene| clip(scene, true, None)),
-    ("speculative, coarse cells", |scene| {
-        clip(scene, true, Some(60))
-    }),
+    Engine {
+        name: "sweep, a strip a row",
+        find: |scene| sweep(&scene.faces, scene.height),
+        large_scenes: 1,
+    },
+    Engine {
+        name: "sweep, 7 strips",
+        find: |scene| sweep(&scene.faces, 7),
+        large_scenes: 40,
+    },
+    Engine {
+        name: "sweep, 53 strips",
+        find: |scene| sweep(&scene.faces, 53),
+        large_scenes: 4,
+    },
+    Engine {
+        name: "clip without a guess",
+        find: |scene| clip(scene, false, None),
+        large_scenes: 1,
+    },
+    Engine {
+        name: "speculative",
+        find: |scene| clip(scene, true, None),
+        large_scenes: 1,
+    },
+    Engine {
+        name: "speculative, coarse cells",
+        find: |scene| clip(scene, true, Some(60)),
+        large_scenes: 20,
+    },
 ];
 
 fn clip(scene: &Scene, guess: bool, cells: Option<u32>) -> (Seen, Report) {
@@ -45,6 +67,16 @@ fn clip(scene: &Scene, guess: bool, cells: Option<u32>) -> (Seen, Report) {
         cells,
     };
     speculative::find_and_report(&scene.faces, &settings)
+}
+
+/// The engines to try on a scene.
+fn engines_for(scene: &Scene) -> impl Iterator<Item = &'static Engine> {
+    let is_large = scene.faces.len() > LARGE;
+    // Large scenes are every tenth.
+    let number = scene.seed / 10;
+    ENGINES
+        .iter()
+        .filter(move |engine| !is_large || number.is_multiple_of(engine.large_scenes))
 }
 
 fn sweep(faces: &Faces, strips: u32) -> (Seen, Report) {
@@ -82,9 +114,14 @@ fn all_engines_see_the_same_areas() {
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::random(seed);
-            let reports = ENGINES.map(|(name, find)| (name, find(&scene)));
-            let is_mended = reports.iter().any(|(_, (_, report))| report.rounds > 0);
-            let results = reports.map(|(name, (seen, _))| (name, seen));
+            let mut is_mended = false;
+            let results: Vec<(&str, Seen)> = engines_for(&scene)
+                .map(|engine| {
+                    let (seen, report) = (engine.find)(&scene);
+                    is_mended |= report.rounds > 0;
+                    (engine.name, seen)
+                })
+                .collect();
             let count = |counter: &AtomicUsize, does: bool| {
                 counter.fetch_add(usize::from(does), Ordering::Relaxed);
             };
@@ -155,7 +192,7 @@ fn same_areas(scene: &Scene, results: &[(&str, Seen)]) -> Result<(), String> {
         ] {
             let difference = largest_difference(one, other);
             if !(difference.size() <= TOLERANCE) {
-                return fail(format!("{what} {difference:?}, {:e}", difference.size()));
+                return fail(format!("{what} {difference}"));
             }
         }
     }
@@ -216,7 +253,7 @@ fn areas_are_those_that_samples_find() {
             let mut scene = Scene::small(seed);
             (scene.width, scene.height) = (8, 6);
             let shares = samples::sample(&scene.faces, scene.width, scene.height, seed);
-            ENGINES.iter().find_map(|(name, find)| {
+            engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let (seen, _) = find(&scene);
                 let fragments = [(&seen.opaque, &shares.opaque), (&seen.veils, &shares.veils)];
                 fragments.into_iter().find_map(|(fragments, shares)| {
@@ -263,7 +300,7 @@ fn sides_lie_on_the_lines_they_name() {
         .par_iter()
         .filter_map(|&seed| {
             let scene = Scene::small(seed);
-            ENGINES.iter().find_map(|(name, find)| {
+            engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let (seen, _) = find(&scene);
                 sides(&seen).find_map(|(fragment, ends, side)| {
                     let off = ends
@@ -296,9 +333,8 @@ fn distance_from_line(faces: &Faces, fragment: &Fragment, side: Side, point: DVe
             let outline = faces.outline(side.face);
             let from = outline[index as usize];
             let to = outline[(index as usize + 1) % outline.len()];
-            let along =
-                ((point - from).dot(to - from) / (to - from).length_squared()).clamp(0.0, 1.0);
-            point.distance(from + (to - from) * along)
+            // A cut goes on along the line, beyond the edge that made it.
+            ((to - from).perp_dot(point - from) / (to - from).length()).abs()
         }
     }
 }
@@ -316,7 +352,7 @@ fn both_sides_of_a_scanline_show_the_same_face() {
             if has_hairs || scene.faces.ids().any(|face| scene.faces.is_veil(face)) {
                 return None;
             }
-            ENGINES.iter().find_map(|(name, find)| {
+            engines_for(&scene).find_map(|Engine { name, find, .. }| {
                 let (seen, _) = find(&scene);
                 sides(&seen).find_map(|(fragment, [from, to], side)| {
                     let is_long = from.distance(to) > 100.0 * NEXT;
@@ -348,10 +384,38 @@ fn the_number_of_threads_makes_no_difference() {
     let (one, three) = (pool(1), pool(3));
     for seed in seeds(SCENES / 100) {
         let scene = Scene::random(seed);
-        for (name, find) in ENGINES {
+        for Engine { name, find, .. } in engines_for(&scene) {
             let (alone, _) = one.install(|| find(&scene));
             let (together, _) = three.install(|| find(&scene));
             assert!(alone == together, "{scene}: {name} depends on threads");
         }
+    }
+}
+
+/// Prints what engines and measuring take for scenes of each kind, in milliseconds of one thread.
+#[test]
+#[ignore = "prints times, proves nothing"]
+fn times() {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a pool of threads");
+    for seed in seeds(120) {
+        let scene = Scene::random(seed);
+        let [mut times, mut fragments] = [String::new(), String::new()];
+        for Engine { find, .. } in engines_for(&scene) {
+            let start = Instant::now();
+            let (seen, _) = pool.install(|| find(&scene));
+            let found = Instant::now();
+            coverage::measure(&scene.faces, &seen.opaque, scene.width, scene.height);
+            let (find, measure) = (found - start, found.elapsed());
+            times += &format!(
+                " {:8.2} + {:6.2}",
+                1e3 * find.as_secs_f64(),
+                1e3 * measure.as_secs_f64()
+            );
+            fragments += &format!(" {}", seen.opaque.len());
+        }
+        println!("{times} ms, fragments{fragments}: {scene}");
     }
 }

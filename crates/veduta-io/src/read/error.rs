@@ -137,7 +137,7 @@ pub enum Problem {
     #[error("is no valid data URI: {0}")]
     DataUri(String),
     /// An index to a row that does not exist.
-    #[error("refers to {what} {index}, but the number of {what}s is {count}")]
+    #[error("refers to {what} {index}, counted from 0, but the file has {count}")]
     NoSuch {
         /// What kind of row.
         what: &'static str,

@@ -40,8 +40,8 @@ fn each_used_vertex(scene: &Scene, mut visit: impl FnMut(DVec3)) {
     }
 }
 
-/// Vertical field of view of the framing camera.
-const FRAMING_FOV: f64 = 35.0_f64.to_radians();
+/// Vertical field of view of the framing camera, in radians.
+pub const FRAMING_FOV: f64 = 35.0_f64.to_radians();
 /// Share of the frame left free on each side.
 const FRAMING_MARGIN: f64 = 0.05;
 
@@ -50,6 +50,11 @@ const FRAMING_MARGIN: f64 = 0.05;
 ///
 /// `aspect` is width over height. `None` for a scene without faces.
 pub fn framing_camera(scene: &Scene, aspect: f64) -> Option<Camera> {
+    framing_camera_of_fov(scene, aspect, FRAMING_FOV)
+}
+
+/// [`framing_camera`] with a vertical field of view of `fov` radians, between 0 and pi.
+pub fn framing_camera_of_fov(scene: &Scene, aspect: f64, fov: f64) -> Option<Camera> {
     let bounds = Bounds::of_scene(scene)?;
     let center = 0.5 * (bounds.min + bounds.max);
     let radius = (0.5 * (bounds.max - bounds.min).length()).max(1e-9);
@@ -59,7 +64,7 @@ pub fn framing_camera(scene: &Scene, aspect: f64) -> Option<Camera> {
         elevation.cos() * azimuth.sin(),
         elevation.sin(),
     );
-    let tan_half_height = (0.5 * FRAMING_FOV).tan();
+    let tan_half_height = (0.5 * fov).tan();
     let projection = Projection::Perspective {
         tan_half_height,
         aspect,

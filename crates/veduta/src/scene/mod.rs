@@ -8,7 +8,7 @@ pub mod generate;
 mod material;
 mod mesh;
 
-pub use framing::{Bounds, framing_camera};
+pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
 pub use material::{AlphaMode, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError};
 

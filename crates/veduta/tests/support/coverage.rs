@@ -3,6 +3,7 @@
 //! Slow and plain on purpose: it shares no code with the pipeline's way from fragments to pixels.
 
 use std::cmp::Ordering;
+use std::fmt;
 use veduta::geometry::DVec2;
 use veduta::map::{Faces, Fragment, Fragments};
 
@@ -132,6 +133,19 @@ impl Difference {
     /// How large the difference is, in square pixels.
     pub fn size(&self) -> f64 {
         (self.areas[0] - self.areas[1]).abs()
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(
+            f,
+            "face {} in pixel {} differs by {:e}: {:?}",
+            self.face,
+            self.pixel,
+            self.size(),
+            self.areas
+        )
     }
 }
 

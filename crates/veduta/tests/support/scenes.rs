@@ -65,7 +65,7 @@ const LARGE_KINDS: [Kind; 7] = [
     ("large slivers", short_slivers),
 ];
 
-/// How many faces a large scene has at least.
+/// How many faces a large scene has more than.
 pub const LARGE: usize = 5_000;
 
 impl Scene {
@@ -95,9 +95,11 @@ impl Scene {
     pub fn large(seed: u64) -> Self {
         let mut rng = Rng::new(seed);
         let (kind, draw) = LARGE_KINDS[rng.integer(0, LARGE_KINDS.len() as u32 - 1) as usize];
-        let size = [rng.integer(12, 24), rng.integer(8, 16)];
+        let size = [rng.integer(12, 24), rng.integer(40, 56)];
         let faces = rng.integer(5_200, 6_000);
-        Self::draw(seed, kind, draw, size, faces, rng)
+        let scene = Self::draw(seed, kind, draw, size, faces, rng);
+        assert!(scene.faces.len() > LARGE, "{scene} should have more faces");
+        scene
     }
 
     fn draw(
@@ -289,7 +291,7 @@ fn soup(canvas: &mut Canvas, count: u32) {
     }
 }
 
-/// Triangles from 3e-5 to 0.1 pixels thick, some on a plane of their corners, which is extreme, and
+/// Triangles from 3e-5 to 0.1 pixels thick, some in pairs on planes of their corners, which is extreme, and
 /// some on a gentle one.
 fn slivers(canvas: &mut Canvas, count: u32) {
     slivers_of_length(canvas, count.min(60), 0.9);
@@ -297,11 +299,12 @@ fn slivers(canvas: &mut Canvas, count: u32) {
 }
 
 fn short_slivers(canvas: &mut Canvas, count: u32) {
-    slivers_of_length(canvas, count, 0.05);
+    slivers_of_length(canvas, count, 0.02);
 }
 
 fn slivers_of_length(canvas: &mut Canvas, count: u32, length: f64) {
-    for _ in 0..count {
+    let first = canvas.faces.len();
+    while canvas.faces.len() < first + count as usize {
         let from = canvas.point();
         let mut along = canvas.direction() * canvas.rng.within(0.2, 1.0) * length * canvas.height;
         if canvas.rng.chance(0.2) {
@@ -499,13 +502,15 @@ fn piercing(canvas: &mut Canvas, count: u32) {
     } else {
         rings.max(3)
     };
+    // Mostly inside the frame, so that there are as many faces as asked for.
+    let size = canvas.width.min(canvas.height);
     for _ in 0..balls {
         let offset = DVec2::new(
             canvas.rng.within(-0.15, 0.15),
             canvas.rng.within(-0.15, 0.15),
         );
-        let centre = canvas.size() * (0.5 + offset);
-        let radius = canvas.rng.within(0.2, 0.45) * canvas.height;
+        let centre = canvas.size() * 0.5 + offset * size;
+        let radius = canvas.rng.within(0.2, 0.35) * size;
         let depth = canvas.rng.within(0.45, 0.55);
         canvas.ball(centre.extend(depth), radius, rings);
     }
@@ -534,7 +539,7 @@ fn wires(canvas: &mut Canvas, count: u32) {
 }
 
 fn short_wires(canvas: &mut Canvas, count: u32) {
-    wires_of_length(canvas, count, 0.1);
+    wires_of_length(canvas, count, 0.05);
 }
 
 fn wires_of_length(canvas: &mut Canvas, count: u32, length: f64) {
@@ -550,7 +555,8 @@ fn wires_of_length(canvas: &mut Canvas, count: u32, length: f64) {
 fn foliage(canvas: &mut Canvas, count: u32) {
     for _ in 0..count {
         let centre = canvas.point();
-        let size = canvas.rng.within(0.5, 1.5) * canvas.height / f64::from(count).sqrt();
+        let size =
+            canvas.rng.within(0.4, 1.2) * (canvas.width * canvas.height / f64::from(count)).sqrt();
         let depth = canvas.rng.within(0.2, 0.8);
         if canvas.rng.chance(0.5) {
             let plane = canvas.any_plane(0.5);

@@ -1,7 +1,7 @@
 //! Pieces become fragments: joined across V-scanlines, their sides named, sorted by face.
 
-use super::h_scan::{EdgeOnScanline, Entering, Strip};
-use super::{Bound, Piece, StripSeen, Trapezoid};
+use super::h_scan::{EdgeOnScanline, Entering, Slice, Strip};
+use super::{Bound, Piece, StripSeen, Trapezoid, is_same_y};
 use crate::visibility::Seen;
 use veduta_geometry::{DVec2, signed_area};
 use veduta_map::{FaceId, Faces, Fragments, Side};
@@ -54,25 +54,32 @@ impl Layer {
         for piece in self.column.drain(..) {
             let shape = piece.shape;
             let before = self.open.iter_mut().rfind(|before| {
-                continues(before, piece.face, shape.left, shape.above, shape.below)
+                before.is_between(piece.face, shape.left, shape.above, shape.below)
             });
-            match before {
-                Some(before) => {
-                    before.shape.right = shape.right;
-                    before.shape.top[1] = shape.top[1];
-                    before.shape.bottom[1] = shape.bottom[1];
-                }
-                None => self.open.push(piece),
+            let joined = before.and_then(|before| {
+                before.shape = before.shape.joined(&shape)?;
+                Some(())
+            });
+            if joined.is_none() {
+                self.open.push(piece);
             }
         }
     }
 
-    /// Takes out the piece of `face` that ends at `x` and lies between these bounds.
-    pub fn take(&mut self, face: FaceId, x: f64, above: Bound, below: Bound) -> Option<Trapezoid> {
-        let place = self
-            .open
-            .iter()
-            .position(|piece| continues(piece, face, x, above, below))?;
+    /// Takes out the piece that `slice` continues from the V-scanline at `x` on, if there is one.
+    pub fn take(&mut self, slice: &Slice, x: f64) -> Option<Trapezoid> {
+        let place = self.open.iter().position(|before| {
+            let shape = &before.shape;
+            before.is_between(slice.face, x, slice.top.bound, slice.bottom.bound)
+                && is_same_y(
+                    shape.top,
+                    [slice.top.at(shape.left), slice.top.at(shape.right)],
+                )
+                && is_same_y(
+                    shape.bottom,
+                    [slice.bottom.at(shape.left), slice.bottom.at(shape.right)],
+                )
+        })?;
         Some(self.open.swap_remove(place).shape)
     }
 
@@ -102,11 +109,38 @@ impl Layer {
     }
 }
 
-fn continues(before: &Piece, face: FaceId, x: f64, above: Bound, below: Bound) -> bool {
-    before.shape.right == x
-        && before.face == face
-        && before.shape.above == above
-        && before.shape.below == below
+impl Piece {
+    fn is_between(&self, face: FaceId, right: f64, above: Bound, below: Bound) -> bool {
+        self.shape.right == right
+            && self.face == face
+            && self.shape.above == above
+            && self.shape.below == below
+    }
+}
+
+impl Trapezoid {
+    /// This one and `next`, to its right and between the same bounds, as one.
+    ///
+    /// `None` if rounding has bent a bound where they meet: near-vertical edges, which cross each
+    /// other within the last bits of x, may be anywhere between two V-scanlines that close together,
+    /// and a straight line from there would go astray.
+    fn joined(&self, next: &Trapezoid) -> Option<Trapezoid> {
+        let joined = Trapezoid {
+            right: next.right,
+            top: [self.top[0], next.top[1]],
+            bottom: [self.bottom[0], next.bottom[1]],
+            ..*self
+        };
+        let [ours, its] = [
+            joined.between(self.left, self.right),
+            joined.between(next.left, next.right),
+        ];
+        let is_straight = is_same_y(ours.top, self.top)
+            && is_same_y(ours.bottom, self.bottom)
+            && is_same_y(its.top, next.top)
+            && is_same_y(its.bottom, next.bottom);
+        is_straight.then_some(joined)
+    }
 }
 
 /// Polygons with named sides.

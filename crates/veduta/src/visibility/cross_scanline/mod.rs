@@ -124,8 +124,8 @@ impl Trapezoid {
     /// The part between the V-scanlines at `left` and `right`, which lie within it.
     fn between(&self, left: f64, right: f64) -> Trapezoid {
         let along = [left, right].map(|x| (x - self.left) / (self.right - self.left));
-        let top = along.map(|along| between(self.top, along));
-        let bottom = along.map(|along| between(self.bottom, along));
+        let top = both_between(self.top, along);
+        let bottom = both_between(self.bottom, along);
         Trapezoid {
             left,
             right,
@@ -153,8 +153,20 @@ struct Piece {
     shape: Trapezoid,
 }
 
-/// Linear interpolation: `ends[0]` at 0, `ends[1]` at 1, never beyond them.
+/// Linear interpolation: `ends[0]` at 0 and `ends[1]` at 1, exactly.
 fn between(ends: [f64; 2], along: f64) -> f64 {
-    let value = ends[0] + (ends[1] - ends[0]) * along;
-    value.clamp(ends[0].min(ends[1]), ends[0].max(ends[1]))
+    if along == 1.0 {
+        ends[1]
+    } else {
+        ends[0] + (ends[1] - ends[0]) * along
+    }
+}
+
+fn both_between(ends: [f64; 2], along: [f64; 2]) -> [f64; 2] {
+    [between(ends, along[0]), between(ends, along[1])]
+}
+
+/// Whether two lines are one between two V-scanlines, where `one` and `other` are their y.
+fn is_same_y(one: [f64; 2], other: [f64; 2]) -> bool {
+    (one[0] - other[0]).abs() <= ROUNDING && (one[1] - other[1]).abs() <= ROUNDING
 }

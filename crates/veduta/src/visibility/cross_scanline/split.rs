@@ -9,7 +9,7 @@
 
 use super::emit::Layer;
 use super::h_scan::Slice;
-use super::{Bound, Piece, ROUNDING, Trapezoid, between};
+use super::{Bound, Piece, ROUNDING, Trapezoid, between, both_between, is_same_y};
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces};
 
@@ -31,8 +31,8 @@ pub(super) struct Splitter {
     bounds: Vec<MemberBound>,
     /// V-scanlines at which the rest of the cluster is cut, the leftmost last.
     cuts: Vec<f64>,
-    /// Members that cover the current trapezoid.
-    cover: Vec<u32>,
+    /// What covers the current trapezoid, in no order, and the same sorted.
+    cover: Vec<Covering>,
     opaque: Vec<Covering>,
     veils: Vec<Covering>,
     /// The parts of the current trapezoid, each with the nearest opaque face.
@@ -55,31 +55,11 @@ impl MemberBound {
     }
 }
 
-/// A face that covers the current trapezoid, and what bounds it there if that face is seen.
+/// A face that covers the current trapezoid.
 #[derive(Clone, Copy)]
 struct Covering {
     face: FaceId,
-    slice: u32,
-    above: Bound,
-    below: Bound,
-}
-
-impl Covering {
-    /// The face is seen in `part` of the current trapezoid.
-    fn piece(&self, part: Trapezoid) -> Piece {
-        let own = |bound: Bound, own: Bound| match bound {
-            Bound::Crossing(..) => bound,
-            Bound::HScanline | Bound::Edge(..) => own,
-        };
-        Piece {
-            face: self.face,
-            shape: Trapezoid {
-                above: own(part.above, self.above),
-                below: own(part.below, self.below),
-                ..part
-            },
-        }
-    }
+    member: u32,
 }
 
 impl Splitter {
@@ -131,21 +111,26 @@ impl Splitter {
         let width = ends[1] - ends[0];
         let along = [left, right].map(|x| (x - ends[0]) / width);
         self.here.clear();
-        self.here.extend(self.members.iter().map(|member| {
-            [member.top, member.bottom].map(|y| along.map(|along| between(y, along)))
-        }));
+        if [left, right] == ends {
+            let y = self
+                .members
+                .iter()
+                .map(|member| [member.top, member.bottom]);
+            self.here.extend(y);
+        } else {
+            self.here.extend(self.members.iter().map(|member| {
+                [
+                    both_between(member.top, along),
+                    both_between(member.bottom, along),
+                ]
+            }));
+        }
         for bound in &mut self.bounds {
             bound.y = self.here[bound.member as usize][usize::from(bound.is_lower)];
         }
-        for index in 1..self.bounds.len() {
-            let moved = self.bounds[index];
-            let mut place = index;
-            while place > 0 && self.bounds[place - 1].middle() > moved.middle() {
-                self.bounds[place] = self.bounds[place - 1];
-                place -= 1;
-            }
-            self.bounds[place] = moved;
-        }
+        // Stable, and quick where the order has hardly changed since the last part.
+        self.bounds
+            .sort_by(|bound, other| bound.middle().total_cmp(&other.middle()));
     }
 
     /// Where two bounds that are neighbours in the middle cross on the way to an end, if any do.
@@ -180,32 +165,36 @@ impl Splitter {
     ) {
         self.cover.clear();
         let mut top = self.bounds[0].y;
-        let mut above = self.name(slices, 0);
         for index in 0..self.bounds.len() {
             let MemberBound { member, y, .. } = self.bounds[index];
             // Never above the bound before, so that rounding makes neither gap nor overlap.
             let bottom = [y[0].max(top[0]), y[1].max(top[1])];
-            let below = self.name(slices, index);
-            let shape = Trapezoid {
-                left,
-                right,
-                top,
-                bottom,
-                above,
-                below,
-            };
-            if !self.cover.is_empty() && !shape.is_flat() {
+            let is_flat = bottom[0] - top[0] <= ROUNDING && bottom[1] - top[1] <= ROUNDING;
+            if !self.cover.is_empty() && !is_flat {
+                let shape = Trapezoid {
+                    left,
+                    right,
+                    top,
+                    bottom,
+                    above: self.name(slices, index - 1),
+                    below: self.name(slices, index),
+                };
                 self.see(faces, slices, shape, hidden, layers);
             }
             // The member's first bound lets it in and the second lets it out. Which of them is the
             // lower one does not matter: a slice thinner than rounding may be upside down.
-            match self.cover.iter().position(|&covering| covering == member) {
+            let is_member = |covering: &Covering| covering.member == member;
+            match self.cover.iter().position(is_member) {
                 Some(place) => {
                     self.cover.swap_remove(place);
                 }
-                None => self.cover.push(member),
+                None => {
+                    let slice = self.members[member as usize].slice;
+                    let face = slices[slice as usize].face;
+                    self.cover.push(Covering { face, member });
+                }
             }
-            (top, above) = (bottom, below);
+            top = bottom;
         }
     }
 
@@ -231,32 +220,37 @@ impl Splitter {
         hidden: &mut [bool],
         [opaque, veils]: &mut [&mut Layer; 2],
     ) {
-        self.cover_shape(faces, slices, &shape);
+        self.sort_cover(faces, &shape);
         self.nearest.clear();
         if let Some((&first, rest)) = self.opaque.split_first() {
             nearest(faces, shape, first, rest, &mut self.nearest);
         }
         for &(covering, part) in &self.nearest {
-            opaque.stack(covering.piece(part));
+            opaque.stack(self.piece(slices, covering, &shape, part));
         }
+        // What rounding may have hidden does not keep a face from being seen whole.
+        let matters = !shape.is_negligible();
+        let mut hide = |covering: &Covering| {
+            hidden[self.members[covering.member as usize].slice as usize] |= matters;
+        };
         for covering in &self.opaque {
-            hidden[covering.slice as usize] |= self
-                .nearest
-                .iter()
-                .any(|(seen, _)| seen.face != covering.face);
+            let is_seen = |(seen, _): &(Covering, _)| seen.face == covering.face;
+            if !self.nearest.iter().all(is_seen) {
+                hide(covering);
+            }
         }
-        for &veil in &self.veils {
+        for veil in &self.veils {
             if self.nearest.is_empty() {
-                veils.stack(veil.piece(shape));
+                veils.stack(self.piece(slices, *veil, &shape, shape));
             }
             for &(front, part) in &self.nearest {
                 match compare(faces, veil.face, front.face, &part) {
-                    Order::Front => veils.stack(veil.piece(part)),
-                    Order::Behind => hidden[veil.slice as usize] = true,
+                    Order::Front => veils.stack(self.piece(slices, *veil, &shape, part)),
+                    Order::Behind => hide(veil),
                     Order::Crossing(parts) => {
-                        hidden[veil.slice as usize] = true;
+                        hide(veil);
                         for seen in parts.iter().filter(|part| part.first_is_front) {
-                            veils.stack(veil.piece(seen.shape));
+                            veils.stack(self.piece(slices, *veil, &shape, seen.shape));
                         }
                     }
                 }
@@ -266,33 +260,15 @@ impl Splitter {
 
     /// Sorts the cover into opaque faces and veils; the opaque face that is nearest in the middle of
     /// the trapezoid comes first, because it is likely to hide the others without any cut.
-    fn cover_shape(&mut self, faces: &Faces, slices: &[Slice], shape: &Trapezoid) {
+    fn sort_cover(&mut self, faces: &Faces, shape: &Trapezoid) {
         let middle = DVec2::new(
             0.5 * (shape.left + shape.right),
             0.25 * (shape.top[0] + shape.top[1] + shape.bottom[0] + shape.bottom[1]),
         );
         self.opaque.clear();
         self.veils.clear();
-        for &member in &self.cover {
-            let index = self.members[member as usize].slice;
-            let slice = &slices[index as usize];
-            let [top, bottom] = self.here[member as usize];
-            // A face prefers its own name for a bound that it shares with others.
-            let is_same = |y: [f64; 2], own: [f64; 2]| {
-                (y[0] - own[0]).abs() <= ROUNDING && (y[1] - own[1]).abs() <= ROUNDING
-            };
-            let own = |is_own: bool, own: Bound, bound: Bound| if is_own { own } else { bound };
-            let covering = Covering {
-                face: slice.face,
-                slice: index,
-                above: own(is_same(shape.top, top), slice.top.bound, shape.above),
-                below: own(
-                    is_same(shape.bottom, bottom),
-                    slice.bottom.bound,
-                    shape.below,
-                ),
-            };
-            if faces.is_veil(slice.face) {
+        for &covering in &self.cover {
+            if faces.is_veil(covering.face) {
                 self.veils.push(covering);
                 continue;
             }
@@ -302,6 +278,30 @@ impl Splitter {
                 self.opaque.swap(0, last);
             }
         }
+    }
+
+    /// What is seen of a face in `part` of the trapezoid `shape`. A face prefers its own name for a
+    /// bound that it shares with others.
+    fn piece(
+        &self,
+        slices: &[Slice],
+        covering: Covering,
+        shape: &Trapezoid,
+        part: Trapezoid,
+    ) -> Piece {
+        let slice = &slices[self.members[covering.member as usize].slice as usize];
+        let [top, bottom] = self.here[covering.member as usize];
+        let mut piece = Piece {
+            face: covering.face,
+            shape: part,
+        };
+        if part.above == shape.above && is_same_y(shape.top, top) {
+            piece.shape.above = slice.top.bound;
+        }
+        if part.below == shape.below && is_same_y(shape.bottom, bottom) {
+            piece.shape.below = slice.bottom.bound;
+        }
+        piece
     }
 }
 

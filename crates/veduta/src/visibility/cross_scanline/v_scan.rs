@@ -244,7 +244,7 @@ impl Sweep {
         }
         let slice = &self.entering.slices[active.slice as usize];
         let layer = layer_of(faces, slice.face, &mut self.opaque, &mut self.veils);
-        let before = layer.take(slice.face, left, slice.top.bound, slice.bottom.bound);
+        let before = layer.take(slice, left);
         active.alone = Some(match before {
             Some(shape) => Alone {
                 left: shape.left,

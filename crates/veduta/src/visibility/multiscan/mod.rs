@@ -4,8 +4,8 @@
 //! after Nishita & Nakamae (1984). Exact along x, sampled along y: quick previews, and the yardstick
 //! of Tanaka & Takahashi (1991), who count what exactness costs in sub-scanlines.
 //!
-//! 1. [`scan`] finds the faces that cross each sub-scanline, sorted by their left ends;
-//! 2. [`sweep`] runs along a sub-scanline and keeps the nearest face, switching where two pierce;
+//! 1. `scan` finds the faces that cross each sub-scanline, sorted by their left ends;
+//! 2. `sweep` runs along a sub-scanline and keeps the nearest face, switching where two pierce;
 //! 3. [`regenerate`](Spans::picture) sums spans to pixels, eq. (1) to (6).
 //!
 //! Sub-scanlines 0 and n of a row lie on its borders and weigh half, as in eq. (1); the one between

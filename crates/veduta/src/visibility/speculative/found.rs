@@ -8,7 +8,7 @@ use super::pieces::{Corner, Pieces};
 use crate::visibility::Seen;
 use rayon::prelude::*;
 use veduta_geometry::DVec2;
-use veduta_map::{FaceId, Faces, Fragments};
+use veduta_map::{FaceId, Faces, Fragments, Side};
 
 /// Fragments of one task, in the order in which it found them.
 #[derive(Default)]
@@ -113,34 +113,80 @@ impl Found {
     /// The fragments by face.
     pub fn into_seen(mut self, faces: &Faces) -> Seen {
         self.entries.par_sort_unstable_by_key(|entry| entry.face);
-        let parts: Vec<Seen> = self
+        let veils: Vec<Entry> = self
             .entries
-            .par_chunks(16 * 1024)
+            .iter()
+            .copied()
+            .filter(|entry| faces.is_veil(entry.face))
+            .collect();
+        if !veils.is_empty() {
+            self.entries.retain(|entry| !faces.is_veil(entry.face));
+        }
+        Seen {
+            opaque: self.in_columns(&self.entries),
+            veils: self.in_columns(&veils),
+        }
+    }
+
+    /// The fragments of `entries`, in their order.
+    fn in_columns(&self, entries: &[Entry]) -> Fragments {
+        // Lengths first, so that tasks can fill the columns side by side.
+        let tasks: Vec<&[Entry]> = entries.chunks(16 * 1024).collect();
+        let lengths: Vec<(usize, usize)> = tasks
+            .par_iter()
             .map(|entries| {
-                let mut seen = Seen::default();
-                for &entry in entries {
-                    let fragments: &mut Fragments = if faces.is_veil(entry.face) {
-                        &mut seen.veils
-                    } else {
-                        &mut seen.opaque
-                    };
-                    for corners in self.fragments(entry) {
-                        if corners.is_empty() {
-                            fragments.push_whole(entry.face);
-                        } else {
-                            let corners = corners.iter().map(|corner| (corner.point, corner.side));
-                            fragments.push_cut(entry.face, corners);
-                        }
-                    }
-                }
-                seen
+                let fragments = entries.iter().map(|entry| entry.count as usize).sum();
+                let corners = entries.iter().flat_map(|&entry| self.fragments(entry));
+                (fragments, corners.map(<[Corner]>::len).sum())
             })
             .collect();
-        let opaque: Vec<&Fragments> = parts.iter().map(|part| &part.opaque).collect();
-        let veils: Vec<&Fragments> = parts.iter().map(|part| &part.veils).collect();
-        Seen {
-            opaque: Fragments::concat(&opaque),
-            veils: Fragments::concat(&veils),
+        let fragments = lengths.iter().map(|length| length.0).sum();
+        let corners = lengths.iter().map(|length| length.1).sum();
+        let mut rows = vec![(FaceId(0), 0); fragments];
+        let mut vertices = vec![DVec2::ZERO; corners];
+        let mut sides = vec![Side::of_outline(FaceId(0), 0); corners];
+        {
+            let (mut rows, mut vertices, mut sides) =
+                (&mut rows[..], &mut vertices[..], &mut sides[..]);
+            let mut first = 0;
+            rayon::scope(|scope| {
+                for (&entries, &(fragments, corners)) in tasks.iter().zip(&lengths) {
+                    let (task_rows, task_vertices, task_sides);
+                    (task_rows, rows) = std::mem::take(&mut rows).split_at_mut(fragments);
+                    (task_vertices, vertices) = std::mem::take(&mut vertices).split_at_mut(corners);
+                    (task_sides, sides) = std::mem::take(&mut sides).split_at_mut(corners);
+                    let start = first;
+                    first += corners;
+                    scope.spawn(move |_| {
+                        self.fill(entries, start, task_rows, task_vertices, task_sides);
+                    });
+                }
+            });
+        }
+        Fragments::from_columns(rows, vertices, sides)
+    }
+
+    fn fill(
+        &self,
+        entries: &[Entry],
+        mut start: usize,
+        rows: &mut [(FaceId, u32)],
+        vertices: &mut [DVec2],
+        sides: &mut [Side],
+    ) {
+        let mut row = 0;
+        let mut at = 0;
+        for &entry in entries {
+            for corners in self.fragments(entry) {
+                rows[row] = (entry.face, start as u32);
+                row += 1;
+                for corner in corners {
+                    vertices[at] = corner.point;
+                    sides[at] = corner.side;
+                    at += 1;
+                }
+                start += corners.len();
+            }
         }
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn mend(
         let changed = take_away(context, found, &admitted, &dirty, report);
         layers.push(admitted);
         let all_layers: Vec<&CellLists> = layers.iter().collect();
-        clip_all(context, &fresh, &all_layers, found, report, |_, _, _| {});
+        clip_all(context, &fresh, &all_layers, None, found, report);
 
         // Prove anew the cells that were wrong and those of every face that changed.
         for &face in changed.iter().chain(&fresh) {

@@ -32,7 +32,6 @@ use clip::{Clipper, Context};
 use found::{Found, Pile};
 use grid::{Extent, Grid};
 use rayon::prelude::*;
-use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces};
 use verify::{Scratch, Verification};
 
@@ -101,17 +100,18 @@ pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
     };
     let mut found = Found::default();
     let in_order = by_place(&context, &candidates);
+    let proof = Proof {
+        verification: &verification,
+        thresholds: &thresholds,
+        lists: &lists,
+    };
     clip_all(
         &context,
         &in_order,
         &[&lists],
+        Some(proof),
         &mut found,
         &mut report,
-        |scratch, piece, plane| {
-            verification.add(&context, scratch, &thresholds, piece, plane, |cell| {
-                lists.guessed(cell)
-            });
-        },
     );
     if settings.guess {
         let verification = &verification;
@@ -132,7 +132,7 @@ pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
 const SAMPLES: u32 = 4;
 
 /// Faces for each cell, by default.
-const FACES_PER_CELL: f64 = 4.0;
+const FACES_PER_CELL: f64 = 8.0;
 
 fn choose_grid(faces: usize, settings: &Settings) -> Grid {
     let cells = settings.cells.map_or_else(
@@ -179,15 +179,23 @@ fn by_place(context: &Context, candidates: &[FaceId]) -> Vec<FaceId> {
     in_order
 }
 
-/// Clips `candidates` by the faces of `lists`, adds what is left to `found`, and hands each opaque
-/// piece to `see`.
+/// Where what is clipped is measured, to prove the guess.
+#[derive(Clone, Copy)]
+struct Proof<'a> {
+    verification: &'a Verification,
+    thresholds: &'a [f32],
+    lists: &'a CellLists,
+}
+
+/// Clips `candidates` by the faces of `lists`, adds what is left to `found`, and measures it for the
+/// proof.
 fn clip_all(
     context: &Context,
     candidates: &[FaceId],
     lists: &[&CellLists],
+    proof: Option<Proof>,
     found: &mut Found,
     report: &mut Report,
-    see: impl Fn(&mut Scratch, &mut dyn Iterator<Item = DVec2>, &Affine) + Sync,
 ) {
     let piles: Vec<Pile> = candidates
         .par_chunks(FACES_PER_TASK)
@@ -198,10 +206,17 @@ fn clip_all(
                 for &face in candidates {
                     clipper.clip(face, lists);
                     clipper.store(face, &mut pile);
-                    if !context.faces.is_veil(face) {
+                    if let Some(proof) = proof
+                        && !context.faces.is_veil(face)
+                    {
                         let plane = context.faces.face_nearness(face);
                         for piece in clipper.pieces.iter() {
-                            see(scratch, &mut piece.iter().map(|corner| corner.point), plane);
+                            let points = piece.iter().map(|corner| corner.point);
+                            let guessed = |cell| proof.lists.guessed(cell);
+                            let thresholds = proof.thresholds;
+                            proof
+                                .verification
+                                .add(context, scratch, thresholds, points, plane, guessed);
                         }
                     }
                 }

@@ -6,7 +6,7 @@
 use super::clip::Context;
 use super::guess::OPEN;
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
-use veduta_geometry::{Affine, Cells, DVec2, GridAreas};
+use veduta_geometry::{Affine, Cells, DVec2, GridAreas, signed_area};
 
 /// Units of coverage in a cell: sums of integers do not depend on their order, so tasks may add to
 /// a cell as they come.
@@ -85,39 +85,69 @@ impl Verification {
         scaled.extend(polygon.map(|point| point * scale));
         // The plane over the grid, where cells have unit size.
         let plane = Affine::new(plane.a / scale.x, plane.b / scale.y, plane.c);
-        let lowest = scaled
-            .iter()
-            .map(|&point| plane.at(point))
-            .fold(f64::INFINITY, f64::min);
-        let see = |column: u32, row: u32, area: f64, exact: &mut dyn FnMut() -> f64| {
-            let cell = grid.index(column, row);
-            if !wanted(cell) {
-                return;
-            }
-            let units = (area * COVERAGE_UNIT).round() as i64;
-            self.coverage[cell].fetch_add(units, Ordering::Relaxed);
-            let threshold = f64::from(thresholds[cell]);
-            if lowest < threshold && lower_bound(&plane, column, row) < threshold {
-                let nearness = exact();
-                if nearness < threshold {
-                    // Rounded down, so that a threshold lowered to it is reached.
-                    let bits = ordered_bits((nearness as f32).next_down());
-                    self.lowest[cell].fetch_min(bits, Ordering::Relaxed);
+        let (mut min, mut max, mut lowest) = (scaled[0], scaled[0], plane.at(scaled[0]));
+        for &point in &scaled[1..] {
+            min = min.min(point);
+            max = max.max(point);
+            lowest = lowest.min(plane.at(point));
+        }
+
+        // Many pieces lie in one cell, and have their area there and nowhere else.
+        let (column, row) = (min.x as u32, min.y as u32);
+        if max.x <= f64::from(column + 1) && max.y <= f64::from(row + 1) {
+            let cell = grid.index(column.min(grid.columns - 1), row.min(grid.rows - 1));
+            if wanted(cell) {
+                self.cover(cell, signed_area(scaled));
+                if lowest < f64::from(thresholds[cell]) {
+                    self.see(cell, lowest);
                 }
             }
-        };
+            return;
+        }
+
         areas.each_cell(scaled, grid.columns, 0..grid.rows, |cells| match cells {
             Cells::Boundary { column, row, area } => {
-                see(column, row, area, &mut || {
-                    lowest_in_cell(scaled, clipped, &plane, column, row)
-                });
+                let cell = grid.index(column, row);
+                if wanted(cell) {
+                    self.cover(cell, area);
+                    let threshold = f64::from(thresholds[cell]);
+                    if lowest < threshold && lower_bound(&plane, column, row) < threshold {
+                        let nearness = lowest_in_cell(scaled, clipped, &plane, column, row);
+                        if nearness < threshold {
+                            self.see(cell, nearness);
+                        }
+                    }
+                }
             }
             Cells::Inside { row, columns } => {
                 for column in columns {
-                    see(column, row, 1.0, &mut || lower_bound(&plane, column, row));
+                    let cell = grid.index(column, row);
+                    if wanted(cell) {
+                        self.cover(cell, 1.0);
+                        let nearness = lower_bound(&plane, column, row);
+                        if nearness < f64::from(thresholds[cell]) {
+                            self.see(cell, nearness);
+                        }
+                    }
                 }
             }
         });
+    }
+
+    /// Adds to the covered share of a cell.
+    #[inline(always)]
+    fn cover(&self, cell: usize, area: f64) {
+        // Areas are positive: cutting off after adding a half rounds, and is cheaper than `round`.
+        let units = (area * COVERAGE_UNIT + 0.5) as i64;
+        self.coverage[cell].fetch_add(units, Ordering::Relaxed);
+    }
+
+    /// Notes a nearness below the cell's threshold.
+    #[cold]
+    fn see(&self, cell: usize, nearness: f64) {
+        // Rounded down, so that a threshold lowered to it is reached.
+        let bits = ordered_bits((nearness as f32).next_down());
+        self.lowest[cell].fetch_min(bits, Ordering::Relaxed);
     }
 
     /// Lowers the threshold of each cell of `cells` in which the guess was not proved right, and

@@ -1,0 +1,68 @@
+//! How the command ends: what each exit code means, and the one way to fail.
+
+use std::fmt;
+use veduta_io::{ErrorKind, ReadError, WriteError, WriteProblem};
+
+/// Exit codes. `0` is success, `130` an interrupt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Code {
+    /// The command line asks for something that makes no sense.
+    Usage = 2,
+    /// Something that is named is missing.
+    Missing = 3,
+    /// The input is damaged or cannot be shown.
+    BadInput = 4,
+    /// The input may be fine, but uses what is not supported.
+    Unsupported = 5,
+    /// The operating system refused to read or write.
+    InputOutput = 6,
+    /// A fault of the program itself (`EX_SOFTWARE` of sysexits.h).
+    Internal = 70,
+    /// The user interrupted it (128 + SIGINT).
+    Interrupted = 130,
+}
+
+/// Why a verb failed, in a sentence.
+#[derive(Debug)]
+pub struct Failure {
+    pub code: Code,
+    message: String,
+}
+
+impl Failure {
+    pub fn new(code: Code, message: impl Into<String>) -> Self {
+        Self {
+            code,
+            message: message.into(),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        let code = match error.kind() {
+            ErrorKind::BadInput => Code::BadInput,
+            ErrorKind::Missing => Code::Missing,
+            ErrorKind::Unsupported => Code::Unsupported,
+            ErrorKind::InputOutput => Code::InputOutput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        let code = match error.problem {
+            WriteProblem::UnknownSuffix(_) => Code::Usage,
+            _ => Code::InputOutput,
+        };
+        Self::new(code, error.to_string())
+    }
+}

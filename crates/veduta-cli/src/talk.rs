@@ -1,0 +1,141 @@
+//! What the command says while it works: to stderr, since stdout is for data.
+
+use crate::exit::{Code, Failure};
+use clap::ValueEnum;
+use std::io::{self, IsTerminal, Write};
+use std::time::Instant;
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ProgressStyle {
+    /// A line that changes, where there is a terminal.
+    #[default]
+    Auto,
+    /// A line that changes.
+    Bar,
+    /// A line of JSON for each step.
+    Json,
+    /// Nothing.
+    None,
+}
+
+/// Speaks with the user.
+#[derive(Debug)]
+pub struct Talk {
+    quiet: bool,
+    verbose: bool,
+    style: ProgressStyle,
+    step: Option<(&'static str, Instant)>,
+    warnings: Vec<String>,
+}
+
+impl Talk {
+    pub fn new(quiet: bool, verbose: bool, progress: ProgressStyle) -> Self {
+        let style = match progress {
+            ProgressStyle::Auto if !quiet && io::stderr().is_terminal() => ProgressStyle::Bar,
+            ProgressStyle::Auto => ProgressStyle::None,
+            style => style,
+        };
+        Self {
+            quiet,
+            verbose,
+            style,
+            step: None,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Says that a step begins, and the one before it is done.
+    pub fn begin(&mut self, step: &'static str) {
+        self.end();
+        match self.style {
+            ProgressStyle::Bar => say(format_args!("\r\x1b[2Kveduta: {step} …")),
+            ProgressStyle::Json => {
+                say(format_args!(
+                    "{}\n",
+                    serde_json::json!({ "step": step, "done": false })
+                ));
+            }
+            ProgressStyle::Auto | ProgressStyle::None => {}
+        }
+        self.step = Some((step, Instant::now()));
+    }
+
+    /// Says that the current step is done.
+    pub fn end(&mut self) {
+        let Some((step, start)) = self.step.take() else {
+            return;
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        match self.style {
+            ProgressStyle::Bar => say(format_args!("\r\x1b[2K")),
+            ProgressStyle::Json => {
+                let line = serde_json::json!({ "step": step, "done": true, "seconds": seconds });
+                say(format_args!("{line}\n"));
+            }
+            ProgressStyle::Auto | ProgressStyle::None => {}
+        }
+        if self.verbose {
+            say(format_args!("veduta: {step}: {seconds:.3} s\n"));
+        }
+    }
+
+    /// Warns, and remembers it for [`Talk::warnings`].
+    pub fn warn(&mut self, message: String) {
+        self.clear_line();
+        if !self.quiet {
+            say(format_args!("veduta: warning: {message}\n"));
+        }
+        self.warnings.push(message);
+    }
+
+    /// Tells a detail, if the user wants details.
+    pub fn detail(&mut self, message: std::fmt::Arguments<'_>) {
+        self.clear_line();
+        if self.verbose {
+            say(format_args!("veduta: {message}\n"));
+        }
+    }
+
+    /// All warnings so far.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn clear_line(&self) {
+        if self.style == ProgressStyle::Bar && self.step.is_some() {
+            say(format_args!("\r\x1b[2K"));
+        }
+    }
+}
+
+impl Drop for Talk {
+    /// Leaves no half line behind when a step fails.
+    fn drop(&mut self) {
+        self.clear_line();
+    }
+}
+
+/// To stderr; that nobody listens there is no reason to fail.
+fn say(text: std::fmt::Arguments<'_>) {
+    let _ = io::stderr().write_fmt(text);
+}
+
+/// Says why the command fails.
+pub fn say_error(message: impl std::fmt::Display) {
+    say(format_args!("veduta: error: {message}\n"));
+}
+
+/// Writes data to stdout.
+pub fn print(text: &str) -> Result<(), Failure> {
+    let mut stdout = io::stdout().lock();
+    match stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+    {
+        Ok(()) => Ok(()),
+        // Who reads has read enough: `veduta info … | head`.
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => Err(Failure::new(Code::InputOutput, format!("stdout: {error}"))),
+    }
+}

@@ -1,0 +1,236 @@
+//! Values of the command line, with their units.
+
+use std::str::FromStr;
+use veduta::pipeline::Sampling;
+use veduta_geometry::DVec3;
+use veduta_io::tone::{Exposure, linear_from_srgb};
+
+/// Size of a picture in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Widest and highest picture.
+const MOST_SIDE: u32 = 65_535;
+/// The most pixels of a picture: 4 GiB as linear f32.
+const MOST_PIXELS: u64 = 1 << 28;
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides = text.split_once(['x', 'X']);
+        let parsed =
+            sides.and_then(|(w, h)| Some((w.parse::<u64>().ok()?, h.parse::<u64>().ok()?)));
+        let Some((width, height)) = parsed else {
+            return Err("expected WIDTHxHEIGHT in pixels, such as 1280x960".into());
+        };
+        let most = u64::from(MOST_SIDE);
+        if width == 0 || height == 0 || width > most || height > most {
+            return Err(format!("each side must be 1 to {MOST_SIDE} pixels"));
+        }
+        if width * height > MOST_PIXELS {
+            return Err(format!(
+                "{} pixels are too many, at most {MOST_PIXELS} fit; render parts and join them",
+                width * height
+            ));
+        }
+        Ok(Self {
+            width: width as u32,
+            height: height as u32,
+        })
+    }
+}
+
+/// An angle in radians, above 0 and below 180 degrees: `40deg`, `40` or `0.7rad`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldOfView(pub f64);
+
+impl FromStr for FieldOfView {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let radians = match text.strip_suffix("rad") {
+            Some(number) => number.trim().parse().ok(),
+            None => {
+                let number = text
+                    .strip_suffix("deg")
+                    .or(text.strip_suffix('°'))
+                    .unwrap_or(text);
+                number.trim().parse().ok().map(f64::to_radians)
+            }
+        };
+        match radians {
+            Some(angle) if angle > 0.0 && angle < std::f64::consts::PI => Ok(Self(angle)),
+            Some(_) => Err("a field of view lies above 0deg and below 180deg".into()),
+            None => Err("expected an angle such as 40deg or 0.7rad".into()),
+        }
+    }
+}
+
+/// `X,Y,Z`, finite.
+pub fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) if DVec3::new(x, y, z).is_finite() => Ok(DVec3::new(x, y, z)),
+        _ => Err("expected X,Y,Z such as 3,-4.5,2".into()),
+    }
+}
+
+/// A finite length above 0, in metres.
+pub fn length(text: &str) -> Result<f64, String> {
+    let number = text.strip_suffix('m').unwrap_or(text).trim().parse::<f64>();
+    match number {
+        Ok(length) if length.is_finite() && length > 0.0 => Ok(length),
+        _ => Err("expected a length above 0 in metres, such as 2.5".into()),
+    }
+}
+
+/// Background of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Background {
+    /// Transparent.
+    None,
+    /// Linear Rec.709.
+    Color([f32; 3]),
+}
+
+impl FromStr for Background {
+    type Err = String;
+
+    /// `none`, `#rgb` or `#rrggbb`, sRGB.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "none" {
+            return Ok(Self::None);
+        }
+        let expected = || "expected none or a colour such as #8ab4d8".to_owned();
+        let digits = text.strip_prefix('#').ok_or_else(expected)?;
+        let digits: Option<Vec<u32>> = digits.chars().map(|digit| digit.to_digit(16)).collect();
+        let bytes = match digits.as_deref() {
+            Some(&[r, g, b]) => [r, g, b].map(|digit| 17 * digit),
+            Some(&[r, r2, g, g2, b, b2]) => [16 * r + r2, 16 * g + g2, 16 * b + b2],
+            _ => return Err(expected()),
+        };
+        Ok(Self::Color(
+            bytes.map(|byte| linear_from_srgb(byte as f32 / 255.0)),
+        ))
+    }
+}
+
+/// `auto`, or a number of EV.
+pub fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    // Beyond 60 EV neither sunlight nor starlight leaves anything to see.
+    match text
+        .strip_suffix("EV")
+        .unwrap_or(text)
+        .trim()
+        .parse::<f32>()
+    {
+        Ok(ev) if ev.abs() <= 60.0 => Ok(Exposure::Ev(ev)),
+        _ => Err("expected auto or a number of EV from -60 to 60".into()),
+    }
+}
+
+/// The most sub-scanlines of a row of pixels; the exact way is cheaper long before.
+const MOST_SUB_SCANLINES: u32 = 1024;
+
+/// `exact`, or `multiscan:N`.
+pub fn sampling(text: &str) -> Result<Sampling, String> {
+    if text == "exact" {
+        return Ok(Sampling::Exact);
+    }
+    let count = text
+        .strip_prefix("multiscan:")
+        .and_then(|count| count.parse().ok());
+    match count {
+        Some(count @ 1..=MOST_SUB_SCANLINES) => Ok(Sampling::Multiscan(count)),
+        _ => Err(format!(
+            "expected exact, or multiscan:N with N from 1 to {MOST_SUB_SCANLINES}"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_whole_numbers_within_reason() {
+        let size = |width, height| Ok(Size { width, height });
+        assert_eq!("1280x960".parse(), size(1280, 960));
+        assert_eq!("1X65535".parse(), size(1, 65_535));
+        for text in [
+            "0x1",
+            "1x0",
+            "65536x1",
+            "100000x100000",
+            "20000x20000",
+            "12",
+            "axb",
+            "-1x5",
+            "1x2x3",
+            "99999999999999999999x1",
+        ] {
+            assert!(text.parse::<Size>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn angles_carry_their_unit() {
+        for text in ["90deg", "90", "90°", "1.5707963267948966rad", "90 deg"] {
+            let FieldOfView(angle) = text.parse().expect(text);
+            assert!(
+                (angle - std::f64::consts::FRAC_PI_2).abs() < 1e-15,
+                "{text}"
+            );
+        }
+        for text in ["0deg", "180deg", "-5", "nan", "inf", "4rad", "deg", ""] {
+            assert!(text.parse::<FieldOfView>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn colours_are_srgb() {
+        let Ok(Background::Color(color)) = "#ff8000".parse() else {
+            panic!("a colour");
+        };
+        assert_eq!((color[0], color[2]), (1.0, 0.0));
+        assert!((color[1] - 0.2159).abs() < 1e-4);
+        assert_eq!("#f80".parse::<Background>(), "#ff8800".parse());
+        assert_eq!("none".parse(), Ok(Background::None));
+        for text in ["ff8000", "#ff80", "#gg0000", "red", "#ff80000", "#é00"] {
+            assert!(text.parse::<Background>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn vectors_have_three_finite_numbers() {
+        assert_eq!(vector("1,-2.5, 3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
+        for text in ["1,2", "1,2,3,4", "1,2,nan", "a,b,c", ""] {
+            assert!(vector(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn samplings_are_exact_or_counted() {
+        assert_eq!(sampling("exact"), Ok(Sampling::Exact));
+        assert_eq!(sampling("multiscan:4"), Ok(Sampling::Multiscan(4)));
+        for text in [
+            "multiscan",
+            "multiscan:0",
+            "multiscan:5000",
+            "multiscan:-1",
+            "4",
+        ] {
+            assert!(sampling(text).is_err(), "{text}");
+        }
+    }
+}
