@@ -5,7 +5,10 @@
 //! code gets. Multiscan is part of the library.
 
 pub mod cases;
+pub mod exchange;
 pub mod fit;
+pub mod glb;
+pub mod peers;
 pub mod table;
 pub mod timing;
 pub mod zbuffer;

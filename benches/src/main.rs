@@ -1,21 +1,26 @@
-//! `veduta-bench`: tables of what finding visibility costs.
+//! `veduta-bench`: tables of what finding visibility costs, and files for `benches/peers`.
 //!
 //! CPU time of one thread, the least of several rounds in which the methods take turns, from
 //! projected faces on.
 
 use std::hint::black_box;
+use std::path::Path;
 use std::process::ExitCode;
 use veduta::accumulate::Picture;
 use veduta::map::VisibilityMap;
 use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
 use veduta_bench::fit::Line;
+use veduta_bench::peers;
 use veduta_bench::table::Table;
 use veduta_bench::timing::{least_times, milliseconds, on_one_thread};
 use veduta_bench::zbuffer::ZBuffer;
 
 const USAGE: &str = "\
 Usage: veduta-bench TABLE [SCENE[@WIDTHxHEIGHT]...]
+       veduta-bench export SCENE[@WIDTHxHEIGHT] FILE
+       veduta-bench reference SCENE[@WIDTHxHEIGHT] FILE.npy
+       veduta-bench own SCENE[@WIDTHxHEIGHT] EXPORTED_FILE PICTURE.npy
 
 Tables:
   n-et      multiscan with n sub-scanlines, the slope and intercept of its time over n, and
@@ -25,7 +30,12 @@ Tables:
 
 Columns: map is the exact map alone, exact the map and its pixels.
 
-Without scenes, those that the documentation tells of.";
+Without scenes, those that the documentation tells of.
+
+For benches/peers:
+  export     the scene in a file that the other programs read
+  reference  its exact picture in flat colours
+  own        our CPU seconds to that picture, as JSON";
 
 /// Rounds of measuring, for scenes that do not take long.
 const ROUNDS: u32 = 5;
@@ -122,7 +132,19 @@ fn main() -> ExitCode {
         println!("{USAGE}");
         return ExitCode::SUCCESS;
     }
-    match print_table(name, scenes) {
+    let done = match (name.as_str(), scenes) {
+        ("export", [title, file]) => {
+            Case::parse(title).and_then(|case| peers::export(&case, Path::new(file)))
+        }
+        ("reference", [title, file]) => {
+            Case::parse(title).and_then(|case| peers::reference(&case, Path::new(file)))
+        }
+        ("own", [title, file, picture]) => Case::parse(title)
+            .and_then(|case| peers::own_times(&case, Path::new(file), Path::new(picture)))
+            .map(|times| println!("{times}")),
+        _ => print_table(name, scenes),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("veduta-bench: {error}");
