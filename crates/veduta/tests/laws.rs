@@ -8,7 +8,7 @@ mod support;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
-use support::coverage::{self, largest_difference};
+use support::coverage::{self, exceeds, largest_difference};
 use support::samples;
 use support::scenes::{LARGE, Scene};
 use veduta::geometry::{DVec2, DVec3};
@@ -191,7 +191,7 @@ fn same_areas(scene: &Scene, results: &[(&str, Seen)]) -> Result<(), String> {
             ("veil", first_veils, &veils),
         ] {
             let difference = largest_difference(one, other);
-            if !(difference.size() <= TOLERANCE) {
+            if exceeds(difference.size(), TOLERANCE) {
                 return fail(format!("{what} {difference}"));
             }
         }
@@ -283,7 +283,7 @@ fn unlikely(coverage: &[coverage::Part], shares: &[(u32, u32, f64)]) -> Option<S
     let wrong = coverage.iter().find_map(|part| {
         let share = share(part.pixel, part.face);
         let tolerance = samples::tolerance(part.perimeter, part.fragments);
-        (!((part.area - share).abs() <= tolerance))
+        exceeds((part.area - share).abs(), tolerance)
             .then(|| format!("{part:?}, but {share} of the samples, +- {tolerance}"))
     });
     wrong.or_else(|| {
@@ -316,7 +316,7 @@ fn sides_lie_on_the_lines_they_name() {
                         .into_iter()
                         .fold(0.0, f64::max);
                     // Lines of different names may be as close as this.
-                    (!(off <= 2e-12)).then(|| {
+                    exceeds(off, 2e-12).then(|| {
                         format!("{scene}: {name}: {side:?} of {fragment:?} is off by {off:e}")
                     })
                 })

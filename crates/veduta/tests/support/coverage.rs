@@ -174,12 +174,16 @@ pub fn largest_difference(one: &[Part], other: &[Part]) -> Difference {
         }
         let (pixel, face) = key;
         let difference = Difference { pixel, face, areas };
-        // A comparison that also lets NaN through.
-        if !(difference.size() <= largest.size()) {
+        if exceeds(difference.size(), largest.size()) {
             largest = difference;
         }
     }
     largest
+}
+
+/// Whether a difference is too large, or not even a number.
+pub fn exceeds(difference: f64, limit: f64) -> bool {
+    difference > limit || difference.is_nan()
 }
 
 /// The smallest and the largest sum of areas in a pixel of a grid of `pixels`.

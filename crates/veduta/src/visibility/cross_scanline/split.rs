@@ -142,7 +142,7 @@ impl Splitter {
                 is_cut = true;
                 continue;
             }
-            self.from_top_to_bottom(found, run.clone(), around, [left, right], all_cross);
+            self.descend(found, run.clone(), around, [left, right], all_cross);
             left = right;
             self.cuts.pop();
             if self.cuts.len() > outer_cuts {
@@ -236,7 +236,7 @@ impl Splitter {
 
     /// Goes through the trapezoids between each bound of `run` and the next, and through the zones in
     /// between; with `in_order`, what is left of crossings is taken for rounding.
-    fn from_top_to_bottom(
+    fn descend(
         &mut self,
         found: &mut Found,
         run: Range<usize>,
@@ -438,7 +438,7 @@ fn nearest(
             Order::Front => {}
             Order::Behind => front = other,
             Order::Crossing(parts) => {
-                for part in parts.iter() {
+                for part in parts {
                     let front = if part.first_is_front { front } else { other };
                     nearest(faces, part.shape, front, &others[index + 1..], found);
                 }
@@ -456,7 +456,7 @@ enum Order {
     /// The second one.
     Behind,
     /// Each in some parts.
-    Crossing(Parts),
+    Crossing(Vec<Part>),
 }
 
 impl Order {
@@ -478,18 +478,6 @@ impl Order {
 struct Part {
     shape: Trapezoid,
     first_is_front: bool,
-}
-
-/// At most three stretches of x, since the line crosses each bound at most once, and in each a part
-/// above the line and one below.
-struct Parts {
-    parts: [Option<Part>; 6],
-}
-
-impl Parts {
-    fn iter(&self) -> impl Iterator<Item = &Part> {
-        self.parts.iter().flatten()
-    }
 }
 
 /// Which of two faces is in front in `shape`, where both are.
@@ -538,11 +526,13 @@ fn compare(faces: &Faces, first: FaceId, second: FaceId, shape: &Trapezoid) -> O
 /// in which upper and lower bound have one sign each:
 ///
 /// ```text
-///     + ┬────+──┬──-───┬ -         in the middle the first face is in front above the line,
-///       │       │ ╲    │           left of it everywhere, right of it nowhere
-///     + ┴────+──┴───+╲─┴ -
+///     + ┬───────┬───────┬─────── -     left: the first face is in front;
+///       │       │╲   -  │              middle: below the line the first, above it the second;
+///       │   +   │  ╲    │   -          right: the second
+///       │       │ +  ╲  │
+///     + ┴───────┴──────╲┴─────── -
 /// ```
-fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Parts {
+fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Vec<Part> {
     let width = shape.right - shape.left;
     let zero = |values: [f64; 2]| {
         ((values[0] > 0.0) != (values[1] > 0.0))
@@ -559,8 +549,9 @@ fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Part
     if ends[1] > ends[2] {
         ends.swap(1, 2);
     }
-    let mut parts = [None; 6];
-    for (stretch, free) in ends.windows(2).zip(parts.chunks_exact_mut(2)) {
+    // At most three stretches, with a part above the line and one below.
+    let mut parts = Vec::with_capacity(6);
+    for stretch in ends.windows(2) {
         let [left, right] = [stretch[0], stretch[1]];
         if left >= right {
             continue;
@@ -575,7 +566,7 @@ fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Part
         };
         let (sign_above, sign_below) = (sign(above, zeros[0]), sign(below, zeros[1]));
         if sign_above.min(sign_below) >= 0.0 || sign_above.max(sign_below) <= 0.0 {
-            free[0] = Some(Part {
+            parts.push(Part {
                 shape: whole,
                 first_is_front: sign_above.min(sign_below) >= 0.0,
             });
@@ -598,7 +589,7 @@ fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Part
             between([whole.top[end], whole.bottom[end]], along)
         };
         let crossing = [y(left, 0), y(right, 1)];
-        free[0] = Some(Part {
+        parts.push(Part {
             shape: Trapezoid {
                 bottom: crossing,
                 below: line,
@@ -606,7 +597,7 @@ fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Part
             },
             first_is_front: sign_above > 0.0,
         });
-        free[1] = Some(Part {
+        parts.push(Part {
             shape: Trapezoid {
                 top: crossing,
                 above: line,
@@ -615,5 +606,5 @@ fn cut(shape: &Trapezoid, above: [f64; 2], below: [f64; 2], line: Bound) -> Part
             first_is_front: sign_above <= 0.0,
         });
     }
-    Parts { parts }
+    parts
 }
