@@ -93,6 +93,11 @@ impl Faces {
         Some(id)
     }
 
+    /// Gives `face` the plane of `other`: they are coplanar, and the smaller id is seen.
+    pub fn share_plane(&mut self, face: FaceId, other: FaceId) {
+        self.plane[face.index()] = self.plane[other.index()];
+    }
+
     /// Declares that a face is not fully opaque: it hides nothing, and opaque faces hide it.
     pub fn set_veil(&mut self, face: FaceId) {
         self.veil.resize(self.plane.len(), false);

@@ -3,11 +3,13 @@
 //! World space is right-handed with Z up, in metres. Readers of foreign files turn what they read
 //! to this, through [`Object::world_from_object`].
 
+mod coplanar;
 mod framing;
 pub mod generate;
 mod material;
 mod mesh;
 
+pub use coplanar::{FaceIndex, coplanar_faces};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
 pub use material::{AlphaMode, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError};

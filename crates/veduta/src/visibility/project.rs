@@ -1,5 +1,7 @@
 //! Scene -> faces in the image plane.
 //!
+//! Coplanar faces share one plane, taken from the first of them.
+//!
 //! Each vertex is projected once, into an image plane without size. Objects and faces are sorted
 //! into the classes of Nishita & Nakamae (1979), §4.2: A, wholly inside the view pyramid; B, before
 //! the eye and partly inside; C, partly behind the eye; D, outside. Only faces of classes B and C
@@ -8,10 +10,11 @@
 //! Neighbours keep bit-equal edges: an edge is clipped from the smaller of its end points, whichever
 //! face asks.
 
-use crate::scene::{Mesh, Object, Scene};
+use crate::scene::{FaceIndex, Mesh, Object, Scene, coplanar_faces};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use veduta_geometry::{DVec2, DVec3, DVec4, signed_area};
-use veduta_map::{Camera, Faces, ObjectId, Projection};
+use veduta_map::{Camera, FaceId, Faces, ObjectId, Projection};
 
 /// Faces a task projects at a time: enough to hide the cost of a task, few enough to share evenly.
 const FACES_PER_TASK: usize = 16 * 1024;
@@ -21,25 +24,50 @@ const FACES_PER_TASK: usize = 16 * 1024;
 /// Faces turned away from the eye are left out where their material is single-sided. Ids ascend by
 /// object, then by face within the object.
 pub fn project(scene: &Scene, camera: &Camera) -> Faces {
+    let coplanar = coplanar_faces(scene);
     let mut faces = Faces::new();
     for (index, object) in scene.objects.iter().enumerate() {
         let mesh = &scene.meshes[object.mesh.0 as usize];
         let view = ObjectView::new(camera, object, mesh);
+        if view.class == Class::Outside {
+            continue;
+        }
+        let object = ObjectId::from_index(index);
+        let of_object = |pair: &(FaceIndex, FaceIndex)| pair.0.0 == object.0;
+        let first = coplanar.partition_point(|pair| pair.0.0 < object.0);
+        let groups = &coplanar[first..];
+        let groups = &groups[..groups.iter().take_while(|pair| of_object(pair)).count()];
         let starts: Vec<usize> = (0..mesh.triangles.len()).step_by(FACES_PER_TASK).collect();
-        if view.class != Class::Outside {
-            let parts: Vec<Faces> = starts
-                .into_par_iter()
-                .map(|start| {
-                    let end = (start + FACES_PER_TASK).min(mesh.triangles.len());
-                    view.project_faces(scene, ObjectId::from_index(index), start..end)
-                })
-                .collect();
-            for part in &parts {
-                faces.append(part);
-            }
+        let parts: Vec<Faces> = starts
+            .into_par_iter()
+            .map(|start| {
+                let end = (start + FACES_PER_TASK).min(mesh.triangles.len());
+                view.project_faces(scene, object, start..end, groups)
+            })
+            .collect();
+        for part in &parts {
+            faces.append(part);
         }
     }
+    share_planes(&mut faces, &coplanar);
     faces
+}
+
+/// Gives coplanar faces one plane. Their nearness is the same already.
+fn share_planes(faces: &mut Faces, coplanar: &[(FaceIndex, FaceIndex)]) {
+    if coplanar.is_empty() {
+        return;
+    }
+    let mut first_seen: HashMap<FaceIndex, FaceId> = HashMap::new();
+    // Faces and pairs ascend alike.
+    let mut pairs = coplanar.iter().peekable();
+    for face in faces.ids() {
+        let index = (faces.object(face).0, faces.source(face));
+        while pairs.next_if(|pair| pair.0 < index).is_some() {}
+        if let Some(&(_, group)) = pairs.next_if(|pair| pair.0 == index) {
+            faces.share_plane(face, *first_seen.entry(group).or_insert(face));
+        }
+    }
 }
 
 /// Where something lies with respect to the view pyramid: Nishita & Nakamae's A, B or C, D.
@@ -124,6 +152,7 @@ impl<'a> ObjectView<'a> {
         scene: &Scene,
         object: ObjectId,
         range: std::ops::Range<usize>,
+        groups: &[(FaceIndex, FaceIndex)],
     ) -> Faces {
         let mut faces = Faces::with_capacity(range.len());
         let mut polygon = ClipPolygon::default();
@@ -149,13 +178,26 @@ impl<'a> ObjectView<'a> {
             {
                 continue;
             }
-            let [p, q, r] = corners.map(|vertex| self.eye[vertex]);
+            let group = groups.binary_search_by_key(&source, |pair| pair.0.1 as usize);
+            let [p, q, r] = match group {
+                Ok(at) => self.eye_corners(scene, groups[at].1),
+                Err(_) => corners.map(|vertex| self.eye[vertex]),
+            };
             if let Some(nearness) = self.camera.nearness_of_plane(p, (q - p).cross(r - p)) {
                 let plane = faces.push_plane(nearness);
                 faces.push(outline, plane, object, source as u32);
             }
         }
         faces
+    }
+
+    /// Eye-space corners of a face of any object, the same to the bit whoever asks.
+    fn eye_corners(&self, scene: &Scene, (object, face): FaceIndex) -> [DVec3; 3] {
+        let object = ObjectId(object);
+        let eye_from_object = self.camera.eye_from_world * scene.object(object).world_from_object;
+        let mesh = scene.mesh_of(object);
+        mesh.triangles[face as usize]
+            .map(|vertex| eye_from_object.transform_point3(mesh.positions[vertex as usize]))
     }
 
     fn class_of(&self, corners: [usize; 3]) -> Class {
@@ -261,7 +303,7 @@ mod tests {
     use super::*;
     use crate::scene::{Material, MeshId};
     use veduta_geometry::DMat4;
-    use veduta_map::{FaceId, MaterialId};
+    use veduta_map::MaterialId;
 
     fn scene_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, double_sided: bool) -> Scene {
         let mesh = Mesh {
@@ -359,6 +401,47 @@ mod tests {
         let mut scene = scene_of(positions.to_vec(), vec![[0, 1, 2]], false);
         scene.objects[0].world_from_object = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
         assert_eq!(project(&scene, &camera()).len(), 1);
+    }
+
+    #[test]
+    fn of_two_tessellations_of_a_wall_the_earlier_object_is_seen() {
+        // A square at an angle, as two triangles and, as another object, turned by one corner: no two
+        // triangles are alike, and no coordinate is exact.
+        let turn = veduta_geometry::DQuat::from_rotation_z(0.5);
+        let corner = |x: f64, z: f64| {
+            (turn * DVec3::new(x, 0.0, z) + 5.0 * DVec3::Y)
+                .as_vec3()
+                .as_dvec3()
+        };
+        let positions = vec![
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ];
+        let mut scene = scene_of(positions, vec![[0, 1, 2], [0, 2, 3]], true);
+        let other = Mesh {
+            triangles: vec![[1, 2, 3], [1, 3, 0]],
+            ..scene.meshes[0].clone()
+        };
+        scene.meshes.push(other);
+        scene.objects.push(Object {
+            mesh: MeshId(1),
+            ..scene.objects[0].clone()
+        });
+        let faces = project(&scene, &camera());
+        assert_eq!(faces.len(), 4);
+        assert!(
+            faces
+                .ids()
+                .all(|face| faces.plane(face) == faces.plane(FaceId(0)))
+        );
+        let seen = crate::visibility::speculative::find(&faces, &Default::default());
+        let whole: Vec<_> = seen.opaque.iter().collect();
+        assert_eq!(
+            whole,
+            [0, 1].map(|face| veduta_map::Fragment::Whole(FaceId(face)))
+        );
     }
 
     #[test]
