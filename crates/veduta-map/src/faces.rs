@@ -69,17 +69,20 @@ impl Faces {
             plane.index() < self.planes.len(),
             "a face needs a plane of this table"
         );
-        let area = veduta_geometry::signed_area(outline);
-        if area == 0.0 || !area.is_finite() {
-            return None;
-        }
         if self.outline_start.is_empty() {
             self.outline_start.push(0);
         }
-        if area > 0.0 {
+        let start = self.vertices.len();
+        if veduta_geometry::signed_area(outline) > 0.0 {
             self.vertices.extend_from_slice(outline);
         } else {
             self.vertices.extend(outline.iter().rev());
+            // Measured from another vertex: the last bits of a sliver's area may say otherwise now.
+            let area = veduta_geometry::signed_area(&self.vertices[start..]);
+            if area <= 0.0 || !area.is_finite() {
+                self.vertices.truncate(start);
+                return None;
+            }
         }
         let id = FaceId::from_index(self.plane.len());
         self.outline_start
