@@ -4,7 +4,7 @@ use veduta_geometry::DVec2;
 /// What lies along a side of a cut fragment, before lines are numbered.
 ///
 /// Engines work in parallel and cannot number lines as they go; they name each side by what made
-/// it, and [`crate::VisibilityMap`] gives equal lines one number.
+/// it, and [`crate::Lines`] gives equal lines one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(C)]
 pub struct Side {

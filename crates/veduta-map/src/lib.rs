@@ -18,6 +18,6 @@ pub use camera::{Camera, Projection};
 pub use faces::Faces;
 pub use fragments::{Fragment, Fragments, Side};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
-pub use line::{FrameSide, Line};
+pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};
 pub use veduta_geometry::Affine;

@@ -372,10 +372,12 @@ impl Naming<'_> {
             .iter()
             .flat_map(|edge| [edge.from, edge.to])
             .filter(|&cut| cut > low + COINCIDENT && cut < high - COINCIDENT)
-            .chain([low, high])
             .collect();
         cuts.sort_by(f64::total_cmp);
         cuts.dedup_by(|next, cut| is_coincident(*next, *cut));
+        // Whatever is between them, the ends stay: the piece has its corners there.
+        cuts.insert(0, low);
+        cuts.push(high);
         let mut parts: Vec<(f64, f64, Side)> = Vec::new();
         for stretch in cuts.windows(2) {
             let middle = 0.5 * (stretch[0] + stretch[1]);

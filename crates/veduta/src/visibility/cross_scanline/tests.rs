@@ -333,6 +333,19 @@ fn edges_that_lean_by_their_last_bits_do_not_bend_what_is_behind() {
 }
 
 #[test]
+fn a_side_too_short_to_be_divided_keeps_its_corners() {
+    // The backdrop shows through a slit, the end of which is an edge on the middle H-scanline.
+    let slit = 5e-13;
+    let mut faces = Faces::new();
+    let [far, near] = [1.0, 2.0].map(|nearness| level(&mut faces, nearness));
+    let backdrop = rectangle(&mut faces, [0.0, 0.0], [1.0, 1.0], far);
+    rectangle(&mut faces, [0.25, 0.25], [0.75, 0.5], near);
+    rectangle(&mut faces, [0.25, 0.5], [0.5, 1.0], near);
+    rectangle(&mut faces, [0.5 + slit, 0.5], [0.75, 1.0], near);
+    assert_areas(&faces, &[(backdrop, 1.0 - 0.375 + 0.5 * slit)]);
+}
+
+#[test]
 #[should_panic(expected = "at least one strip")]
 fn zero_strips_are_refused() {
     seen(&Faces::new(), 0);
