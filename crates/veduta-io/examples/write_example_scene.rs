@@ -17,7 +17,7 @@ const HALF_X: f64 = 420.0;
 const HALF_Y: f64 = 270.0;
 /// Of the terrain's grid.
 const CELL: f64 = 12.0;
-const UNDERSIDE_Z: f64 = -48.0;
+const UNDERSIDE_Z: f64 = -36.0;
 /// Of a tower's axis from the middle.
 const TOWER_X: f64 = 150.0;
 const TOWER_TOP: f64 = 128.0;
@@ -32,17 +32,16 @@ const HANGER_WIDTH: f64 = 0.22;
 
 /// Names and sRGB colours.
 const MATERIALS: &[(&str, u32)] = &[
-    ("water", 0x4a86a0),
-    ("water_deep", 0x35708e),
+    ("water", 0x3f7890),
     ("water_side", 0x2c5f7d),
-    ("earth", 0x8b6f56),
+    ("earth", 0x7d6552),
     ("sand", 0xcfbd8e),
-    ("meadow", 0x9caa5a),
-    ("grass", 0x7f9a4c),
-    ("wood", 0x62803f),
+    ("meadow", 0x8f9a5e),
+    ("grass", 0x728a4c),
+    ("wood", 0x5a7543),
     ("rock", 0x9a938a),
-    ("leaves_light", 0x5f8a44),
-    ("leaves_dark", 0x47713d),
+    ("leaves_light", 0x557a42),
+    ("leaves_dark", 0x3f6339),
     ("wall_cream", 0xeadfc8),
     ("wall_ochre", 0xd9b67c),
     ("wall_rose", 0xd9a590),
@@ -74,7 +73,11 @@ fn main() -> std::io::Result<()> {
     }
     cables_and_hangers(&mut model);
     town(&mut model);
-    for (x, y, heading) in [(-40.0, -190.0, 0.5), (70.0, -95.0, 0.9), (40.0, 170.0, 2.2)] {
+    for (x, y, heading) in [
+        (-30.0, -170.0, -2.4),
+        (75.0, -80.0, -2.1),
+        (40.0, 170.0, 2.2),
+    ] {
         boat(&mut model, DVec3::new(x, y, 0.0), heading);
     }
     let folder = Path::new(&folder);
@@ -209,7 +212,7 @@ fn ground(x: f64, y: f64) -> f64 {
     };
     let natural = 0.45 * inland.min(14.0) + hill + 2.6 * rolling * smoothstep(10.0, 90.0, inland);
     // Levelled where the road comes ashore.
-    let road = (-(y / 21.0).powi(4)).exp() * smoothstep(ANCHOR_X - 42.0, ANCHOR_X - 6.0, x.abs());
+    let road = (-(y / 36.0).powi(2)).exp() * smoothstep(ANCHOR_X - 42.0, ANCHOR_X - 6.0, x.abs());
     natural + (DECK_Z - 1.4 - natural) * road
 }
 
@@ -279,26 +282,29 @@ fn cover(point: DVec3, normal: DVec3) -> &'static str {
     }
 }
 
-/// Level water that runs into the banks, in patches of two colours.
+/// Water with low waves that runs into the banks.
 fn water(model: &mut Model) {
     model.object("river");
-    const STEP: f64 = 30.0;
-    let rows = (2.0 * HALF_Y / STEP) as i32;
+    const STEP: f64 = 15.0;
+    const COLUMNS: usize = 28;
+    let rows = (2.0 * HALF_Y / STEP) as usize;
+    let first = model.vertices + 1;
+    for row in 0..=rows {
+        for column in 0..=COLUMNS {
+            let x = STEP * (column as f64 - 0.5 * COLUMNS as f64);
+            let y = -HALF_Y + STEP * row as f64;
+            let waves = (x / 19.0 + y / 31.0).sin() + (x / 27.0 - y / 13.0).cos();
+            // Level where the model is cut.
+            let calm = smoothstep(0.0, 30.0, HALF_Y - y.abs());
+            model.vertex(DVec3::new(x, y, 0.3 * waves * calm));
+        }
+    }
     for row in 0..rows {
-        for column in -7..7 {
-            let (x, y) = (STEP * f64::from(column), -HALF_Y + STEP * f64::from(row));
-            let ripple = (x / 61.0 + 0.7 * (y / 44.0).sin()).sin() + 0.6 * (y / 27.0).cos();
-            let material = if ripple > 0.1 { "water" } else { "water_deep" };
-            let corner = |i, j| DVec3::new(x + STEP * i, y + STEP * j, 0.0);
-            model.polygon(
-                material,
-                &[
-                    corner(0., 0.),
-                    corner(1., 0.),
-                    corner(1., 1.),
-                    corner(0., 1.),
-                ],
-            );
+        for column in 0..COLUMNS {
+            let a = first + row * (COLUMNS + 1) + column;
+            let [b, c, d] = [a + 1, a + COLUMNS + 2, a + COLUMNS + 1];
+            model.face("water", &[a, b, c]);
+            model.face("water", &[a, c, d]);
         }
     }
 }
@@ -399,11 +405,11 @@ fn cables_and_hangers(model: &mut Model) {
     }
 }
 
-/// The same sequence of numbers in 0..1 on every run (splitmix64).
+/// The same numbers on every run: SplitMix64 (Steele, Lea and Flood, 2014).
 struct Random(u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.0;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -412,11 +418,11 @@ impl Random {
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
+        low + (high - low) * self.unit()
     }
 
     fn of<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[(self.next() * choices.len() as f64) as usize]
+        choices[(self.unit() * choices.len() as f64) as usize]
     }
 }
 
@@ -432,9 +438,9 @@ fn town(model: &mut Model) {
         let inland = x.abs() - 190.0;
         let crowded = if x < 0.0 { 0.95 } else { 0.55 };
         let wanted = if houses {
-            random.next() < crowded * (1.0 - smoothstep(40.0, 190.0, inland + 0.15 * y.abs()))
+            random.unit() < crowded * (1.0 - smoothstep(40.0, 190.0, inland + 0.15 * y.abs()))
         } else {
-            random.next() < 0.25 + 0.75 * smoothstep(40.0, 160.0, inland)
+            random.unit() < 0.25 + 0.75 * smoothstep(40.0, 160.0, inland)
         };
         let free = point.z > 4.0
             && y.abs() > radius + 15.0
@@ -470,7 +476,7 @@ fn town(model: &mut Model) {
         model,
         &around(belfry, 0.25, [7.0, 7.0]),
         church.z + 42.0,
-        belfry.extend_to(church.z + 82.0),
+        DVec3::new(belfry.x, belfry.y, church.z + 82.0),
         "roof_slate",
     );
 
@@ -479,17 +485,6 @@ fn town(model: &mut Model) {
         if let Some(place) = claim(&mut random, 4.0, false) {
             tree(model, &mut random, place);
         }
-    }
-}
-
-/// Replaces the height of a point.
-trait ExtendTo {
-    fn extend_to(self, z: f64) -> DVec3;
-}
-
-impl ExtendTo for DVec3 {
-    fn extend_to(self, z: f64) -> DVec3 {
-        DVec3::new(self.x, self.y, z)
     }
 }
 
