@@ -53,7 +53,7 @@ const MATERIALS: &[(&str, u32)] = &[
     ("steel_dark", 0x7d2f26),
     ("stone", 0xc4bcae),
     ("road", 0x6c6a6c),
-    ("wire", 0xd8d0c6),
+    ("wire", 0x54383a),
     ("lamp", 0x4a4d52),
     ("sail", 0xf4f0e4),
     ("hull", 0x7a3f2c),
