@@ -17,9 +17,12 @@ const SLACK: f32 = 0.25;
 
 /// Thresholds of all cells, from `samples` by `samples` z-buffer samples a cell.
 pub(super) fn thresholds(faces: &Faces, extents: &[Extent], grid: &Grid, samples: u32) -> Vec<f32> {
-    // Each band of cell rows has its own z-buffer. A band looks at every face's extent, so there
-    // are as many as threads; a sample holds a maximum, so the bands change nothing.
-    let bands = rayon::current_num_threads().min(grid.rows as usize) as u32;
+    // Each band of cell rows has its own z-buffer. A sample holds a maximum, so the bands change
+    // nothing. Each looks at every face's extent, so one thread has one band; more have some each,
+    // since what is to be drawn is often all in one half of the picture.
+    let threads = rayon::current_num_threads();
+    let bands = if threads == 1 { 1 } else { 4 * threads };
+    let bands = bands.min(grid.rows as usize) as u32;
     let rows_of = |band: u32| band * grid.rows / bands..(band + 1) * grid.rows / bands;
     let parts: Vec<Vec<f32>> = (0..bands)
         .into_par_iter()

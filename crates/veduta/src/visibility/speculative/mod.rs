@@ -32,6 +32,7 @@ use clip::{Clipper, Context};
 use found::{Found, Pile};
 use grid::{Extent, Grid};
 use rayon::prelude::*;
+use std::sync::Mutex;
 use veduta_map::{FaceId, Faces};
 use verify::{Scratch, Verification};
 
@@ -159,7 +160,7 @@ fn choose_grid(faces: usize, settings: &Settings) -> Grid {
 }
 
 /// Candidates clipped by a task at a time.
-const FACES_PER_TASK: usize = 512;
+const FACES_PER_TASK: usize = 256;
 
 impl Report {
     fn count(&mut self, pile: &Pile) {
@@ -208,32 +209,38 @@ fn clip_all(
     found: &mut Found,
     report: &mut Report,
 ) {
+    // A clipper is as large as the scene has faces, so tasks hand theirs on rather than make new ones.
+    let idle: Mutex<Vec<(Clipper, Scratch)>> = Mutex::new(Vec::new());
+    let lock = || idle.lock().expect("no task fails while it holds the lock");
     let piles: Vec<Pile> = candidates
         .par_chunks(FACES_PER_TASK)
-        .map_init(
-            || (Clipper::new(*context), Scratch::default()),
-            |(clipper, scratch), candidates| {
-                let mut pile = Pile::default();
-                for &face in candidates {
-                    clipper.clip(face, lists);
-                    clipper.store(face, &mut pile);
-                    if let Some(proof) = proof
-                        && !context.faces.is_veil(face)
-                    {
-                        let plane = context.faces.face_nearness(face);
-                        for piece in clipper.pieces.iter() {
-                            let points = piece.iter().map(|corner| corner.point);
-                            let guessed = |cell| proof.lists.guessed(cell);
-                            let thresholds = proof.thresholds;
-                            proof
-                                .verification
-                                .add(context, scratch, thresholds, points, plane, guessed);
-                        }
+        .map(|candidates| {
+            let tools = lock().pop();
+            let (mut clipper, mut scratch) =
+                tools.unwrap_or_else(|| (Clipper::new(*context), Scratch::default()));
+            let mut pile = Pile::default();
+            for &face in candidates {
+                clipper.clip(face, lists);
+                clipper.store(face, &mut pile);
+                if let Some(proof) = proof
+                    && !context.faces.is_veil(face)
+                {
+                    let plane = context.faces.face_nearness(face);
+                    for piece in clipper.pieces.iter() {
+                        let points = piece.iter().map(|corner| corner.point);
+                        let guessed = |cell| proof.lists.guessed(cell);
+                        let Proof {
+                            verification,
+                            thresholds,
+                            ..
+                        } = proof;
+                        verification.add(context, &mut scratch, thresholds, points, plane, guessed);
                     }
                 }
-                pile
-            },
-        )
+            }
+            lock().push((clipper, scratch));
+            pile
+        })
         .collect();
     for pile in piles {
         report.count(&pile);
