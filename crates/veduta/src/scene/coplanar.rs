@@ -23,6 +23,13 @@ const ROUNDING: f64 = 4.0 * 0.5 / (1 << 23) as f64;
 const NORMAL_SLOT: f64 = 1.0 / (1 << 12) as f64;
 const DISTANCE_SLOT: f64 = 1.0 / (1 << 14) as f64;
 
+/// More than the number of slots on either side of zero: the distance of a plane is at most twice the
+/// scene's extent.
+const SHIFT: f64 = (1 << 20) as f64;
+
+/// Faces and vertices a task looks at at a time.
+const FACES_PER_TASK: usize = 16 * 1024;
+
 /// A face of the scene: index of its object, index in the object's mesh.
 pub type FaceIndex = (u32, u32);
 
@@ -31,37 +38,53 @@ pub type FaceIndex = (u32, u32);
 /// Faces so small that rounding leaves their normal open by more than a slot's width are left alone:
 /// nothing can be said of their plane.
 pub fn coplanar_faces(scene: &Scene) -> Vec<(FaceIndex, FaceIndex)> {
-    let Some(bounds) = crate::scene::Bounds::of_scene(scene) else {
-        return Vec::new();
+    let positions: Vec<Vec<DVec3>> = scene
+        .objects
+        .iter()
+        .map(|object| {
+            let positions = &scene.meshes[object.mesh.0 as usize].positions;
+            let place = |&position: &DVec3| object.world_from_object.transform_point3(position);
+            positions
+                .par_iter()
+                .with_min_len(FACES_PER_TASK)
+                .map(place)
+                .collect()
+        })
+        .collect();
+    let largest = |points: &Vec<DVec3>| {
+        let sizes = points
+            .par_iter()
+            .with_min_len(FACES_PER_TASK)
+            .map(|p| p.abs().max_element());
+        sizes.reduce(|| 0.0, f64::max)
     };
-    let extent = bounds.min.abs().max(bounds.max.abs()).max_element();
+    let extent = positions.iter().map(largest).fold(0.0, f64::max);
     let slots = Slots {
         distance: (extent * DISTANCE_SLOT).max(f64::MIN_POSITIVE),
     };
-    let faces: Vec<(FaceIndex, Plane)> = scene
-        .objects
-        .par_iter()
-        .enumerate()
-        .flat_map(|(object, placed)| {
-            let mesh = &scene.meshes[placed.mesh.0 as usize];
-            (0..mesh.triangles.len())
-                .into_par_iter()
-                .with_min_len(4096)
-                .filter_map(move |face| {
-                    let corners = mesh.triangles[face].map(|vertex| {
-                        placed
-                            .world_from_object
-                            .transform_point3(mesh.positions[vertex as usize])
-                    });
-                    Some((
-                        (object as u32, face as u32),
-                        Plane::of(corners, slots.distance)?,
-                    ))
-                })
-        })
-        .collect();
+    let mut faces: Vec<(FaceIndex, Plane)> = Vec::new();
+    for (object, (placed, positions)) in scene.objects.iter().zip(&positions).enumerate() {
+        let triangles = &scene.meshes[placed.mesh.0 as usize].triangles;
+        let parts: Vec<Vec<(FaceIndex, Plane)>> = triangles
+            .par_chunks(FACES_PER_TASK)
+            .enumerate()
+            .map(|(chunk, triangles)| {
+                let first = chunk * FACES_PER_TASK;
+                let plane_of = |(face, triangle): (usize, &[u32; 3])| {
+                    let corners = triangle.map(|vertex| positions[vertex as usize]);
+                    let plane = Plane::of(corners, slots.distance)?;
+                    Some(((object as u32, (first + face) as u32), plane))
+                };
+                triangles.iter().enumerate().filter_map(plane_of).collect()
+            })
+            .collect();
+        faces.extend(parts.into_iter().flatten());
+    }
+    if faces.is_empty() {
+        return Vec::new();
+    }
 
-    let counters: Vec<AtomicU8> = (0..(4 * faces.len()).next_power_of_two())
+    let counters: Vec<AtomicU8> = (0..(16 * faces.len()).next_power_of_two())
         .map(|_| AtomicU8::new(0))
         .collect();
     let counter = |slot: &Slot| &counters[hash(slot) as usize & (counters.len() - 1)];
@@ -124,19 +147,21 @@ impl Plane {
         let [p, q, r] = corners;
         let (u, v) = (q - p, r - p);
         let cross = u.cross(v);
-        let longest = u
+        let longest_squared = u
             .length_squared()
             .max(v.length_squared())
-            .max((r - q).length_squared())
-            .sqrt();
-        let twice_area = cross.length();
+            .max((r - q).length_squared());
         let largest = p.abs().max(q.abs()).max(r.abs()).max_element();
         let tolerance = ROUNDING * largest;
-        let normal_tolerance = tolerance * longest / twice_area;
+        // What fine meshes are made of is told without a root.
+        let unsure = 16.0 * tolerance * tolerance * longest_squared;
+        if unsure >= NORMAL_SLOT * NORMAL_SLOT * cross.length_squared() {
+            return None;
+        }
+        let twice_area = cross.length();
+        let normal_tolerance = tolerance * longest_squared.sqrt() / twice_area;
         let distance_tolerance = tolerance + normal_tolerance * largest;
-        let is_sure =
-            4.0 * normal_tolerance < NORMAL_SLOT && 4.0 * distance_tolerance < distance_slot;
-        if !is_sure {
+        if 4.0 * distance_tolerance >= distance_slot {
             return None;
         }
         // Of the two normals the one whose largest component is positive.
@@ -191,10 +216,18 @@ impl Slots {
         let widths = [NORMAL_SLOT, NORMAL_SLOT, NORMAL_SLOT, self.distance];
         let [n, d] = [plane.normal_tolerance, plane.distance_tolerance];
         let tolerances = [n, n, n, d];
-        let ends = |k: usize| {
-            [-1.0, 1.0].map(|sign| ((values[k] + sign * tolerances[k]) / widths[k]).floor() as i64)
-        };
-        let ends: [[i64; 2]; 4] = std::array::from_fn(ends);
+        // Shifted to be positive, so that a conversion rounds down without a call.
+        let slot = |k: usize, value: f64| (value / widths[k] + SHIFT) as i64;
+        let ends: [[i64; 2]; 4] = std::array::from_fn(|k| {
+            [
+                slot(k, values[k] - tolerances[k]),
+                slot(k, values[k] + tolerances[k]),
+            ]
+        });
+        if ends.iter().all(|[low, high]| low == high) {
+            visit(ends.map(|[low, _]| low));
+            return;
+        }
         for choice in 0..16_usize {
             let end = |k: usize| choice >> k & 1;
             let is_new = (0..4).all(|k| end(k) == 0 || ends[k][0] != ends[k][1]);
