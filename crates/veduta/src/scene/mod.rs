@@ -8,11 +8,13 @@ mod framing;
 pub mod generate;
 mod material;
 mod mesh;
+mod world;
 
 pub use coplanar::{FaceIndex, coplanar_faces};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
 pub use material::{AlphaMode, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError};
+pub use world::{Layer, World};
 
 use veduta_geometry::DMat4;
 use veduta_map::{Camera, MaterialId, ObjectId};
@@ -52,6 +54,10 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Named cameras that came with the model.
     pub cameras: Vec<(String, Camera)>,
+    /// What layers the objects are of, in the order of the objects; empty where there is one only.
+    pub layers: Vec<Layer>,
+    /// Where on Earth the scene is.
+    pub world: World,
 }
 
 impl Scene {
@@ -79,7 +85,7 @@ impl Scene {
     pub fn face_count(&self) -> usize {
         self.objects
             .iter()
-            .map(|object| self.meshes[object.mesh.0 as usize].triangles.len())
+            .map(|object| self.meshes[object.mesh.0 as usize].face_count())
             .sum()
     }
 }
