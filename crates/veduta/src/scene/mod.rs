@@ -10,7 +10,7 @@ mod material;
 mod mesh;
 mod world;
 
-pub use coplanar::{FaceIndex, coplanar_faces};
+pub use coplanar::{FaceIndex, PlaneGroups};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
 pub use material::{AlphaMode, Image, Material, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError};

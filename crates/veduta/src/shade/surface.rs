@@ -52,16 +52,21 @@ pub struct PicturePoint {
 }
 
 /// Barycentric coordinates of a triangle, as functions of the image plane, up to a common factor.
+/// Those of the first triangle of a larger face serve all of it.
 ///
 /// In perspective a point on the ray with direction d, z = 1, is `z d = Σ w_i V_i`, so that
 /// `w / z = [V0 V1 V2]⁻¹ d`: these are affine in the image plane, since d is, and their sum is 1/z.
 /// In parallel projection the coordinates themselves are affine. That holds for corners behind
 /// the eye, too, so a face that the near plane cut needs no other corners.
 #[derive(Clone, Copy, Debug)]
-struct Corners([Affine; 3]);
+struct Corners {
+    weights: [Affine; 3],
+    /// No weight is less on the face: zero on a triangle.
+    least: f64,
+}
 
 impl Corners {
-    fn new(camera: &Camera, corners: [DVec3; 3]) -> Self {
+    fn new(camera: &Camera, corners: [DVec3; 3], is_triangle: bool) -> Self {
         let scale = camera.image_scale();
         let [v0, v1, v2] = corners;
         // Each row c is a function c · (X, Y, 1) with X = (x - 1/2) / scale.x, Y likewise.
@@ -77,10 +82,12 @@ impl Corners {
                 (rows, f0.dot(rows[0]))
             }
         };
-        Self(rows.map(|row| {
+        let weights = rows.map(|row| {
             let (a, b) = (row.x / scale.x / whole, row.y / scale.y / whole);
             Affine::new(a, b, row.z / whole - 0.5 * (a + b))
-        }))
+        });
+        let least = if is_triangle { 0.0 } else { f64::NEG_INFINITY };
+        Self { weights, least }
     }
 
     /// Barycentric coordinates at an image point, and their sum's inverse (the depth).
@@ -90,7 +97,7 @@ impl Corners {
     /// middle.
     #[inline]
     fn at(&self, image: DVec2) -> ([f64; 3], f64) {
-        let weights = self.0.map(|weight| weight.at(image).max(0.0));
+        let weights = self.weights.map(|weight| weight.at(image).max(self.least));
         let sum: f64 = weights.iter().sum();
         if sum > 0.0 && sum.is_finite() {
             let depth = 1.0 / sum;
@@ -148,7 +155,8 @@ impl<'a> Viewer<'a> {
         if material.base_color_texture.is_some() && !mesh.texcoords.is_empty() {
             return None;
         }
-        let corners = mesh.triangles[source as usize].map(|corner| corner as usize);
+        let triangles = mesh.triangles_of(source);
+        let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
         let [r, g, b, _] = material.base_color;
         let mut color = Vec3::new(r, g, b);
         if !mesh.colors.is_empty() {
@@ -175,13 +183,14 @@ impl<'a> Viewer<'a> {
         let mesh = self.scene.mesh_of(object);
         let material = mesh.material_of(source);
         let texture = self.scene.material(material).base_color_texture;
-        let corners = mesh.triangles[source as usize].map(|corner| corner as usize);
+        let triangles = mesh.triangles_of(source);
+        let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
         let eye_corners = self.eye_corners(object, source);
         let turn = &self.objects[object.index()].world_normal_from_object;
         let has = |rows: usize| (rows > 0).then_some(corners);
         Varying {
             material,
-            corners: Corners::new(&self.map.camera, eye_corners),
+            corners: Corners::new(&self.map.camera, eye_corners, triangles.len() == 1),
             face_normal: self.face_normal(&eye_corners),
             normals: has(mesh.normals.len()).map(|corners| {
                 // Normalised here: an object scaled unequally would weigh its corners otherwise.
@@ -201,10 +210,11 @@ impl<'a> Viewer<'a> {
         }
     }
 
+    /// Corners of the face that span it: all three of a triangle.
     fn eye_corners(&self, object: ObjectId, source: u32) -> [DVec3; 3] {
         let mesh = self.scene.mesh_of(object);
         let eye_from_object = &self.objects[object.index()].eye_from_object;
-        mesh.triangles[source as usize]
+        mesh.triangles[mesh.triangles_of(source).start]
             .map(|corner| eye_from_object.transform_point3(mesh.positions[corner as usize]))
     }
 
@@ -255,7 +265,7 @@ impl Varying {
             picture: self.picture.map(|[p, q, r]| {
                 let at = p * w0 + q * w1 + r * w2;
                 // Quotient rule: at = Σ p_i b_i / Σ b_i, with affine b_i.
-                let [b0, b1, b2] = self.corners.0;
+                let [b0, b1, b2] = self.corners.weights;
                 let along = |d0: f64, d1: f64, d2: f64| {
                     ((p - at) * d0 + (q - at) * d1 + (r - at) * d2) * depth
                 };
@@ -304,7 +314,7 @@ mod tests {
         for projection in BOTH {
             let camera = camera(projection);
             for triangle in triangles() {
-                let corners = Corners::new(&camera, triangle);
+                let corners = Corners::new(&camera, triangle, true);
                 for expected in [[0.2, 0.5, 0.3], [0.9, 0.05, 0.05], [0.6, 0.35, 0.05]] {
                     let [v0, v1, v2] = triangle;
                     let point = v0 * expected[0] + v1 * expected[1] + v2 * expected[2];
@@ -324,7 +334,7 @@ mod tests {
             for triangle in triangles() {
                 let face = Varying {
                     material: MaterialId(0),
-                    corners: Corners::new(&camera, triangle),
+                    corners: Corners::new(&camera, triangle, true),
                     face_normal: -Vec3::Z,
                     normals: None,
                     picture: Some([(0.0, 0.3), (1.0, 0.1), (0.4, 2.0)].map(DVec2::from)),
@@ -345,7 +355,8 @@ mod tests {
     fn a_triangle_seen_edge_on_is_evaluated_in_its_middle() {
         for projection in BOTH {
             let line = [0.0, 1.0, 2.0].map(|t| DVec3::new(t, t, 1.0));
-            let (weights, _) = Corners::new(&camera(projection), line).at(DVec2::new(0.2, 0.7));
+            let (weights, _) =
+                Corners::new(&camera(projection), line, true).at(DVec2::new(0.2, 0.7));
             assert_eq!(weights, [1.0 / 3.0; 3]);
         }
     }
