@@ -62,9 +62,9 @@ struct Corners([Affine; 3]);
 
 impl Corners {
     fn new(camera: &Camera, corners: [DVec3; 3]) -> Self {
-        let scale = camera.image_scale();
+        let (scale, ahead) = (camera.image_scale(), camera.principal_point());
         let [v0, v1, v2] = corners;
-        // Each row c is a function c · (X, Y, 1) with X = (x - 1/2) / scale.x, Y likewise.
+        // Each row c is a function c · (X, Y, 1) with X = (x - ahead.x) / scale.x, Y likewise.
         let (rows, whole) = match camera.projection {
             Projection::Perspective { .. } => {
                 let rows = [v1.cross(v2), v2.cross(v0), v0.cross(v1)];
@@ -79,7 +79,7 @@ impl Corners {
         };
         Self(rows.map(|row| {
             let (a, b) = (row.x / scale.x / whole, row.y / scale.y / whole);
-            Affine::new(a, b, row.z / whole - 0.5 * (a + b))
+            Affine::new(a, b, row.z / whole - (a * ahead.x + b * ahead.y))
         }))
     }
 
@@ -289,6 +289,7 @@ mod tests {
             eye_from_world: DMat4::IDENTITY,
             projection,
             near: 0.1,
+            shift: DVec2::new(0.3, -0.6),
         }
     }
 
