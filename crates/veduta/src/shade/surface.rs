@@ -69,7 +69,7 @@ impl Corners {
     fn new(camera: &Camera, corners: [DVec3; 3], is_triangle: bool) -> Self {
         let scale = camera.image_scale();
         let [v0, v1, v2] = corners;
-        // Each row c is a function c · (X, Y, 1) with X = (x - 1/2) / scale.x, Y likewise.
+        // Each row c is a function c · (X, Y, 1) with X = (x - ahead.x) / scale.x, Y likewise.
         let (rows, whole) = match camera.projection {
             Projection::Perspective { .. } => {
                 let rows = [v1.cross(v2), v2.cross(v0), v0.cross(v1)];
@@ -84,10 +84,15 @@ impl Corners {
         };
         let weights = rows.map(|row| {
             let (a, b) = (row.x / scale.x / whole, row.y / scale.y / whole);
+<<<<<<< HEAD
             Affine::new(a, b, row.z / whole - 0.5 * (a + b))
         });
         let least = if is_triangle { 0.0 } else { f64::NEG_INFINITY };
         Self { weights, least }
+=======
+            Affine::new(a, b, row.z / whole - (a * ahead.x + b * ahead.y))
+        }))
+>>>>>>> 2b7de3b
     }
 
     /// Barycentric coordinates at an image point, and their sum's inverse (the depth).
@@ -299,6 +304,7 @@ mod tests {
             eye_from_world: DMat4::IDENTITY,
             projection,
             near: 0.1,
+            shift: DVec2::new(0.3, -0.6),
         }
     }
 

@@ -217,16 +217,17 @@ impl<'a> ObjectView<'a> {
 #[inline]
 fn homogeneous(camera: &Camera, point: DVec3) -> DVec4 {
     let scale = camera.image_scale();
+    let ahead = camera.principal_point();
     match camera.projection {
         Projection::Perspective { .. } => DVec4::new(
-            point.x * scale.x + 0.5 * point.z,
-            point.y * scale.y + 0.5 * point.z,
+            point.x * scale.x + ahead.x * point.z,
+            point.y * scale.y + ahead.y * point.z,
             point.z,
             point.z,
         ),
         Projection::Parallel { .. } => DVec4::new(
-            point.x * scale.x + 0.5,
-            point.y * scale.y + 0.5,
+            point.x * scale.x + ahead.x,
+            point.y * scale.y + ahead.y,
             1.0,
             point.z,
         ),
