@@ -1,6 +1,6 @@
 //! What a face looks like from the eye, made ready for evaluation at any point of it.
 
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Scene, TextureRef};
 use crate::shade::light::Daylight;
 use crate::shade::texture::picture_from_uv;
 use veduta_geometry::{DMat3, DMat4, DVec2, DVec3, Vec3};
@@ -24,8 +24,10 @@ pub struct Varying {
     face_normal: Vec3,
     /// At the corners, in world space; not normalised.
     normals: Option<[Vec3; 3]>,
-    /// Picture coordinates at the corners.
+    /// Coordinates at the corners in the picture of the colour.
     picture: Option<[DVec2; 3]>,
+    /// Those in the picture of the emission; boxed because few faces have one.
+    emissive_picture: Option<Box<[DVec2; 3]>>,
     colors: Option<[Vec3; 3]>,
 }
 
@@ -36,8 +38,10 @@ pub struct SurfacePoint {
     pub normal: Vec3,
     /// Factor of the material's colour.
     pub color: Vec3,
-    /// Place in the texture, if there is one.
+    /// Place in the texture of the colour, if there is one.
     pub picture: Option<PicturePoint>,
+    /// Place in the texture of the emission, if there is one.
+    pub emissive_picture: Option<PicturePoint>,
 }
 
 /// A place in a texture and the footprint of a pixel there.
@@ -67,7 +71,7 @@ struct Corners {
 
 impl Corners {
     fn new(camera: &Camera, corners: [DVec3; 3], is_triangle: bool) -> Self {
-        let scale = camera.image_scale();
+        let (scale, ahead) = (camera.image_scale(), camera.principal_point());
         let [v0, v1, v2] = corners;
         // Each row c is a function c · (X, Y, 1) with X = (x - ahead.x) / scale.x, Y likewise.
         let (rows, whole) = match camera.projection {
@@ -84,15 +88,10 @@ impl Corners {
         };
         let weights = rows.map(|row| {
             let (a, b) = (row.x / scale.x / whole, row.y / scale.y / whole);
-<<<<<<< HEAD
-            Affine::new(a, b, row.z / whole - 0.5 * (a + b))
+            Affine::new(a, b, row.z / whole - (a * ahead.x + b * ahead.y))
         });
         let least = if is_triangle { 0.0 } else { f64::NEG_INFINITY };
         Self { weights, least }
-=======
-            Affine::new(a, b, row.z / whole - (a * ahead.x + b * ahead.y))
-        }))
->>>>>>> 2b7de3b
     }
 
     /// Barycentric coordinates at an image point, and their sum's inverse (the depth).
@@ -157,7 +156,11 @@ impl<'a> Viewer<'a> {
         let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = self.scene.material_of(object, source);
-        if material.base_color_texture.is_some() && !mesh.texcoords.is_empty() {
+        let lit = self.lit(material);
+        let emissive_texture = material.emissive_texture.filter(|_| lit);
+        let textures = [material.base_color_texture, emissive_texture];
+        let placed = |texture: &TextureRef| !mesh.texcoords_of(texture.texcoords).is_empty();
+        if textures.iter().flatten().any(placed) {
             return None;
         }
         let triangles = mesh.triangles_of(source);
@@ -167,7 +170,7 @@ impl<'a> Viewer<'a> {
         if !mesh.colors.is_empty() {
             color *= Vec3::from(all_equal(corners.map(|corner| mesh.colors[corner]))?);
         }
-        if !self.lit(material) {
+        if !lit {
             return Some(color.into());
         }
         let face_normal = self.face_normal(&self.eye_corners(object, source));
@@ -187,12 +190,18 @@ impl<'a> Viewer<'a> {
         let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = mesh.material_of(source);
-        let texture = self.scene.material(material).base_color_texture;
+        let textures = self.scene.material(material);
         let triangles = mesh.triangles_of(source);
         let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
         let eye_corners = self.eye_corners(object, source);
         let turn = &self.objects[object.index()].world_normal_from_object;
         let has = |rows: usize| (rows > 0).then_some(corners);
+        let picture = |texture: Option<TextureRef>| {
+            let texture = texture?;
+            let texcoords = mesh.texcoords_of(texture.texcoords);
+            let corners = has(texcoords.len())?;
+            Some(corners.map(|corner| picture_from_uv(&texture, texcoords[corner])))
+        };
         Varying {
             material,
             corners: Corners::new(&self.map.camera, eye_corners, triangles.len() == 1),
@@ -205,11 +214,8 @@ impl<'a> Viewer<'a> {
                         .as_vec3()
                 })
             }),
-            picture: texture
-                .zip(has(mesh.texcoords.len()))
-                .map(|(texture, corners)| {
-                    corners.map(|corner| picture_from_uv(&texture, mesh.texcoords[corner]))
-                }),
+            picture: picture(textures.base_color_texture),
+            emissive_picture: picture(textures.emissive_texture).map(Box::new),
             colors: has(mesh.colors.len())
                 .map(|corners| corners.map(|corner| Vec3::from(mesh.colors[corner]))),
         }
@@ -261,25 +267,26 @@ impl Varying {
     pub fn at(&self, image: DVec2) -> SurfacePoint {
         let ([w0, w1, w2], depth) = self.corners.at(image);
         let mean = |[a, b, c]: [Vec3; 3]| a * w0 as f32 + b * w1 as f32 + c * w2 as f32;
+        let place = |&[p, q, r]: &[DVec2; 3]| {
+            let at = p * w0 + q * w1 + r * w2;
+            // Quotient rule: at = Σ p_i b_i / Σ b_i, with affine b_i.
+            let [b0, b1, b2] = self.corners.weights;
+            let along =
+                |d0: f64, d1: f64, d2: f64| ((p - at) * d0 + (q - at) * d1 + (r - at) * d2) * depth;
+            PicturePoint {
+                at,
+                along_x: along(b0.a, b1.a, b2.a),
+                along_y: along(b0.b, b1.b, b2.b),
+            }
+        };
         SurfacePoint {
             normal: match self.normals {
                 Some(normals) => on_side_of(mean(normals), self.face_normal),
                 None => self.face_normal,
             },
             color: self.colors.map_or(Vec3::ONE, mean),
-            picture: self.picture.map(|[p, q, r]| {
-                let at = p * w0 + q * w1 + r * w2;
-                // Quotient rule: at = Σ p_i b_i / Σ b_i, with affine b_i.
-                let [b0, b1, b2] = self.corners.weights;
-                let along = |d0: f64, d1: f64, d2: f64| {
-                    ((p - at) * d0 + (q - at) * d1 + (r - at) * d2) * depth
-                };
-                PicturePoint {
-                    at,
-                    along_x: along(b0.a, b1.a, b2.a),
-                    along_y: along(b0.b, b1.b, b2.b),
-                }
-            }),
+            picture: self.picture.as_ref().map(place),
+            emissive_picture: self.emissive_picture.as_deref().map(place),
         }
     }
 }
@@ -344,6 +351,7 @@ mod tests {
                     face_normal: -Vec3::Z,
                     normals: None,
                     picture: Some([(0.0, 0.3), (1.0, 0.1), (0.4, 2.0)].map(DVec2::from)),
+                    emissive_picture: None,
                     colors: None,
                 };
                 let at = |p| face.at(p).picture.expect("it has a texture");
