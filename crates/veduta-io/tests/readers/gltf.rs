@@ -331,10 +331,7 @@ fn textures_that_cannot_be_had_are_warned_of() {
     let texts: Vec<_> = loaded.warnings.iter().map(ToString::to_string).collect();
     assert_eq!(texts.len(), 3, "{texts:?}");
     for (text, place) in texts.iter().zip(["images[0]", "images[1]", "textures[2]"]) {
-        assert!(
-            text.contains(place) && text.ends_with("left out"),
-            "{text}"
-        );
+        assert!(text.contains(place) && text.ends_with("left out"), "{text}");
     }
     let textures = loaded
         .scene

@@ -373,7 +373,8 @@ fn place_lights(
     }
     if !scene.lights.is_empty() {
         let count = scene.lights.len();
-        let message = format!("{count} lights are read, but pictures do not show their light yet");
+        let are = if count == 1 { "light is" } else { "lights are" };
+        let message = format!("{count} {are} read, but pictures do not show what they light yet");
         let place = Place::Json("extensions.KHR_lights_punctual".into());
         warnings.add(place, message);
     }
