@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
 use veduta::map::{Camera, Projection};
-use veduta::pipeline::{self, RenderSettings, Sampling, Shortcoming};
+use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::DVec3;
 use veduta_io::tone::{self, Exposure, Tone};
@@ -126,15 +126,17 @@ impl Render {
             sampling: self.sampling,
             unlit: self.look.unlit,
         };
-        if self.sampling != Sampling::Exact {
-            let message = "--sampling multiscan makes no pictures yet; leave it out";
-            return Err(Failure::new(Code::Unsupported, message));
-        }
-        talk.begin("finding visibility");
-        let map = pipeline::find_visibility(&scene, &camera);
-        self.tell_shortcomings(&scene, &pipeline::shortcomings(&scene, &map), talk)?;
-        talk.begin("shading");
-        let mut picture = pipeline::render_map(&scene, &map, &settings);
+        let Rendered {
+            mut picture,
+            shortcomings,
+        } = pipeline::render(&scene, &camera, &settings, |step| match step {
+            Step::Projecting => talk.begin("projecting"),
+            Step::FindingVisibility => talk.begin("finding visibility"),
+            Step::Shading => talk.begin("shading"),
+            Step::Strip { index: 0, .. } => talk.begin("rendering strip by strip"),
+            _ => {}
+        });
+        self.tell_shortcomings(&scene, &shortcomings, talk)?;
         talk.begin("developing");
         let ev = self.look.develop(&mut picture, &scene, format);
         talk.begin("writing");
