@@ -242,7 +242,7 @@ fn render_spans(
 
 /// Faces of a strip, about, where there are more faces than pixels: enough to keep all cores at
 /// work, few enough to bound memory.
-const FACES_PER_STRIP: usize = 512 * 1024;
+const FACES_PER_STRIP: usize = 128 * 1024;
 
 /// Makes a picture in `strips` strips of its rows or fewer, without keeping a map.
 fn render_strips(
