@@ -16,6 +16,12 @@ mod names;
 #[cfg(feature = "obj")]
 mod obj;
 mod picture;
+#[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
+mod polygon;
+#[cfg(any(feature = "obj", feature = "ply", feature = "stl"))]
+mod text;
+#[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
+mod vertices;
 
 pub use error::{ErrorKind, Place, Problem, ReadError, Warning};
 
