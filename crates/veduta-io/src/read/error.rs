@@ -56,6 +56,13 @@ pub enum Place {
     Byte(u64),
     /// A path into a JSON document, such as `meshes[3].primitives[0].indices`.
     Json(String),
+    /// A path into the JSON document on a line of a file of such lines.
+    JsonInLine {
+        /// The line, counted from 1.
+        line: u64,
+        /// The path.
+        path: String,
+    },
 }
 
 impl fmt::Display for Place {
@@ -66,6 +73,7 @@ impl fmt::Display for Place {
             Place::Line(line) => write!(f, ":{line}"),
             Place::Byte(offset) => write!(f, ": byte {offset}"),
             Place::Json(path) => write!(f, ": {path}"),
+            Place::JsonInLine { line, path } => write!(f, ":{line}: {path}"),
         }
     }
 }
@@ -114,6 +122,14 @@ pub enum Problem {
     /// The JSON does not parse, or not to what glTF asks for.
     #[error("is not valid glTF: {0}")]
     Json(String),
+    /// The file breaks the grammar of its format.
+    #[error("is not valid {format}: {found}")]
+    NotValid {
+        /// The format.
+        format: &'static str,
+        /// What is wrong.
+        found: String,
+    },
     /// The file says that it cannot be understood without an extension.
     #[error("the extension {0} is required but not supported; export the model without it")]
     RequiredExtension(String),

@@ -6,12 +6,14 @@
 //! that Z is up, `picture` decodes textures, `budget` bounds memory.
 
 mod budget;
+#[cfg(feature = "cityjson")]
+mod cityjson;
 mod error;
 mod files;
 mod finish;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(feature = "gltf")]
+#[cfg(any(feature = "gltf", feature = "cityjson", feature = "stl"))]
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
@@ -23,6 +25,8 @@ mod text;
 #[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
 mod vertices;
 
+#[cfg(feature = "cityjson")]
+pub use cityjson::{LevelOfDetail, LevelOfDetailError};
 pub use error::{ErrorKind, Place, Problem, ReadError, Warning};
 
 use budget::Budget;
@@ -46,6 +50,10 @@ pub enum UpAxis {
 pub struct ReadOptions {
     /// The axis that points upwards; `None` for what is usual in the format.
     pub up_axis: Option<UpAxis>,
+    /// The level of detail of city models: of each object the highest up to this, or else the
+    /// lowest; `None` for the highest.
+    #[cfg(feature = "cityjson")]
+    pub level_of_detail: Option<LevelOfDetail>,
 }
 
 /// A scene, and what was read otherwise than the file asks for.
@@ -65,6 +73,14 @@ pub const SCENE_SUFFIXES: &[&str] = &[
     "gltf",
     #[cfg(feature = "obj")]
     "obj",
+    #[cfg(feature = "cityjson")]
+    "city.json",
+    #[cfg(feature = "cityjson")]
+    "city.jsonl",
+    #[cfg(feature = "cityjson")]
+    "json",
+    #[cfg(feature = "cityjson")]
+    "jsonl",
 ];
 
 /// Reads a scene from a file and the files it names.
@@ -93,6 +109,8 @@ enum Format {
     Gltf,
     #[cfg(feature = "obj")]
     Obj,
+    #[cfg(feature = "cityjson")]
+    CityJson,
 }
 
 impl Format {
@@ -104,6 +122,8 @@ impl Format {
             Some("glb" | "gltf") => return Ok(Some(Self::Gltf)),
             #[cfg(feature = "obj")]
             Some("obj") => return Ok(Some(Self::Obj)),
+            #[cfg(feature = "cityjson")]
+            Some("json" | "jsonl") => return Ok(Some(Self::CityJson)),
             _ => {}
         }
         let mut start = Vec::new();
@@ -115,6 +135,18 @@ impl Format {
             gltf::MAGIC => Some(Self::Gltf),
             _ => None,
         })
+    }
+
+    /// The axis that points upwards in most files.
+    fn usual_up(&self) -> UpAxis {
+        match self {
+            #[cfg(feature = "gltf")]
+            Self::Gltf => UpAxis::Y,
+            #[cfg(feature = "obj")]
+            Self::Obj => UpAxis::Y,
+            #[cfg(feature = "cityjson")]
+            Self::CityJson => UpAxis::Z,
+        }
     }
 }
 
@@ -133,8 +165,14 @@ fn read(path: &Path, options: &ReadOptions, warnings: &mut Warnings) -> Result<S
         Format::Gltf => gltf::read(path, &bytes, &mut budget, warnings)?,
         #[cfg(feature = "obj")]
         Format::Obj => obj::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "cityjson")]
+        Format::CityJson => {
+            let level = options.level_of_detail;
+            cityjson::read(path, &bytes, level, &mut budget, warnings)?
+        }
     };
-    finish::turn_up(&mut scene, options.up_axis.unwrap_or(UpAxis::Y));
+    let up = options.up_axis.unwrap_or_else(|| format.usual_up());
+    finish::turn_up(&mut scene, up);
     finish::check_reach(&scene).map_err(whole)?;
     Ok(scene)
 }

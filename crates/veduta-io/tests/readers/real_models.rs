@@ -82,6 +82,7 @@ fn models_stand_upright_and_face_minus_y() {
     // As Z up, the spot's height lies along Y, as in its file.
     let z_up = ReadOptions {
         up_axis: Some(UpAxis::Z),
+        ..ReadOptions::default()
     };
     let spot = read_scene(&models.join("spot.obj"), &z_up)
         .expect("spot")
