@@ -25,6 +25,7 @@ impl ReadError {
             Problem::UnknownFormat { .. }
             | Problem::Version { .. }
             | Problem::RequiredExtension(_)
+            | Problem::PointCloud { .. }
             | Problem::RemoteUri(_) => ErrorKind::Unsupported,
             Problem::NotThere { .. } | Problem::NoBinChunk => ErrorKind::Missing,
             _ => ErrorKind::BadInput,
@@ -234,6 +235,14 @@ pub enum Problem {
         index: i64,
         /// How many were given before.
         count: usize,
+    },
+    /// Points without faces.
+    #[error(
+        "has {points} points but no faces; make a surface of them first, for example in MeshLab"
+    )]
+    PointCloud {
+        /// How many points.
+        points: usize,
     },
     /// A face with too few or too many corners.
     #[error("a face with {found} corners, expected 3 to {most}")]

@@ -17,9 +17,19 @@ mod gltf;
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "ply",
+    feature = "cityjson"
+))]
 mod picture;
+#[cfg(feature = "ply")]
+mod ply;
 #[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
 mod polygon;
+#[cfg(feature = "stl")]
+mod stl;
 #[cfg(any(feature = "obj", feature = "ply", feature = "stl"))]
 mod text;
 #[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
@@ -73,6 +83,10 @@ pub const SCENE_SUFFIXES: &[&str] = &[
     "gltf",
     #[cfg(feature = "obj")]
     "obj",
+    #[cfg(feature = "ply")]
+    "ply",
+    #[cfg(feature = "stl")]
+    "stl",
     #[cfg(feature = "cityjson")]
     "city.json",
     #[cfg(feature = "cityjson")]
@@ -109,6 +123,10 @@ enum Format {
     Gltf,
     #[cfg(feature = "obj")]
     Obj,
+    #[cfg(feature = "ply")]
+    Ply,
+    #[cfg(feature = "stl")]
+    Stl,
     #[cfg(feature = "cityjson")]
     CityJson,
 }
@@ -122,17 +140,25 @@ impl Format {
             Some("glb" | "gltf") => return Ok(Some(Self::Gltf)),
             #[cfg(feature = "obj")]
             Some("obj") => return Ok(Some(Self::Obj)),
+            #[cfg(feature = "ply")]
+            Some("ply") => return Ok(Some(Self::Ply)),
+            #[cfg(feature = "stl")]
+            Some("stl") => return Ok(Some(Self::Stl)),
             #[cfg(feature = "cityjson")]
             Some("json" | "jsonl") => return Ok(Some(Self::CityJson)),
             _ => {}
         }
         let mut start = Vec::new();
         File::open(path)
-            .and_then(|file| file.take(4).read_to_end(&mut start))
+            .and_then(|file| file.take(512).read_to_end(&mut start))
             .map_err(Problem::Unreadable)?;
         Ok(match start.as_slice() {
             #[cfg(feature = "gltf")]
-            gltf::MAGIC => Some(Self::Gltf),
+            start if start.starts_with(gltf::MAGIC) => Some(Self::Gltf),
+            #[cfg(feature = "ply")]
+            start if start.starts_with(ply::MAGIC) => Some(Self::Ply),
+            #[cfg(feature = "stl")]
+            start if stl::is_text(start) => Some(Self::Stl),
             _ => None,
         })
     }
@@ -144,6 +170,10 @@ impl Format {
             Self::Gltf => UpAxis::Y,
             #[cfg(feature = "obj")]
             Self::Obj => UpAxis::Y,
+            #[cfg(feature = "ply")]
+            Self::Ply => UpAxis::Z,
+            #[cfg(feature = "stl")]
+            Self::Stl => UpAxis::Z,
             #[cfg(feature = "cityjson")]
             Self::CityJson => UpAxis::Z,
         }
@@ -165,6 +195,10 @@ fn read(path: &Path, options: &ReadOptions, warnings: &mut Warnings) -> Result<S
         Format::Gltf => gltf::read(path, &bytes, &mut budget, warnings)?,
         #[cfg(feature = "obj")]
         Format::Obj => obj::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "ply")]
+        Format::Ply => ply::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "stl")]
+        Format::Stl => stl::read(path, &bytes, &mut budget, warnings)?,
         #[cfg(feature = "cityjson")]
         Format::CityJson => {
             let level = options.level_of_detail;

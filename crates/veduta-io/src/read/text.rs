@@ -29,6 +29,7 @@ impl<'a> Iterator for Tokens<'a> {
     }
 }
 
+#[cfg(any(feature = "obj", feature = "stl"))]
 impl<'a> Tokens<'a> {
     /// The next word, unless a comment starts there.
     pub fn next_value(&mut self) -> Option<&'a [u8]> {
@@ -40,6 +41,7 @@ impl<'a> Tokens<'a> {
     }
 
     /// The next number, or `absent` at the end of the line.
+    #[cfg(feature = "obj")]
     pub fn number_or(&mut self, absent: f64) -> Result<f64, Problem> {
         match self.next_value() {
             None => Ok(absent),

@@ -58,6 +58,7 @@ impl Combinations {
     }
 
     /// A new vertex that no other corner shares.
+    #[cfg(feature = "obj")]
     pub fn own(&mut self) -> u32 {
         self.vertices.push(([NONE; 2], NONE));
         self.vertices.len() as u32 - 1

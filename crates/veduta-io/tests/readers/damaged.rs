@@ -1,6 +1,7 @@
 //! Files with damage of every small kind: each is read or refused, in bounded memory, without panic.
 
 use crate::support::{Folder, Glb, small_png};
+use crate::{cityjson, ply, stl};
 use peak_alloc::PeakAlloc;
 use serde_json::{Value, json};
 use veduta::scene::Scene;
@@ -178,9 +179,48 @@ fn an_obj_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
 }
 
 #[test]
+fn an_stl_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    read_damaged(
+        "m.stl",
+        &stl::binary(b"COLOR=\x00\xff\x00\xff", [1, 0x8000, 3, 4]),
+    );
+    read_damaged("m.stl", stl::text("part").as_bytes());
+}
+
+#[test]
+fn a_ply_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    for file in ply::rich() {
+        read_damaged("m.ply", &file);
+    }
+}
+
+#[test]
+fn cityjson_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    read_damaged("m.city.json", cityjson::house().to_string().as_bytes());
+    read_damaged("m.city.jsonl", cityjson::sequence().as_bytes());
+}
+
+#[test]
 fn json_with_wrong_values_anywhere_is_read_or_refused() {
     let sound = rich_glb();
+    read_with_wrong_values("m.glb", &sound.json, |json| {
+        let bin = sound.bin.clone();
+        let json = json.clone();
+        Glb { json, bin }.bytes()
+    });
+}
+
+#[test]
+fn cityjson_with_wrong_values_anywhere_is_read_or_refused() {
+    let to_bytes = |json: &Value| json.to_string().into_bytes();
+    read_with_wrong_values("m.city.json", &cityjson::rich(), to_bytes);
+}
+
+/// Reads files that are sound but for up to four values. `VEDUTA_DAMAGED` names the number of files;
+/// there are 6000 otherwise.
+fn read_with_wrong_values(name: &str, sound: &Value, bytes_of: impl Fn(&Value) -> Vec<u8>) {
     let folder = Folder::new();
+    assert!(check(name, folder.read(name, bytes_of(sound)), "undamaged"));
     let values = [
         json!(0),
         json!(1),
@@ -203,21 +243,20 @@ fn json_with_wrong_values_anywhere_is_read_or_refused() {
         json!(true),
         json!([0, 0, 0, 0]),
     ];
+    let cases = std::env::var("VEDUTA_DAMAGED").map_or(6000, |n| n.parse().expect("a number"));
     let mut read = 0;
-    const CASES: usize = 6000;
-    for seed in 0..CASES {
+    for seed in 0..cases {
         let mut random = Random(seed as u64);
-        let mut glb = sound.clone();
+        let mut json = sound.clone();
         for _ in 0..=random.below(3) {
-            damage(&mut glb.json, &values, &mut random);
+            damage(&mut json, &values, &mut random);
         }
-        let json = &glb.json;
         let case = format!("seed {seed}: {json}");
-        read += usize::from(check("m.glb", folder.read("m.glb", glb.bytes()), case));
+        read += usize::from(check(name, folder.read(name, bytes_of(&json)), case));
     }
     assert!(
-        read > 0 && read < CASES,
-        "{read} of {CASES} damaged files were read"
+        read > 0 && read < cases,
+        "{read} of {cases} damaged files were read"
     );
     let peak = MEMORY.peak_usage();
     assert!(peak < MOST_MEMORY, "{peak} bytes");

@@ -27,7 +27,7 @@ use document::{Appearance, CityObject, Document, Geometry, Transform};
 use look::{DocumentLook, Look, at, no_such};
 use std::collections::HashMap;
 use std::path::Path;
-use surfaces::{Losses, MeshBuilder, Rounding, Shared, Wrong};
+use surfaces::{Losses, MeshBuilder, Rounding, Shared, Wrong, depth_of};
 use veduta::scene::{Mesh, MeshId, Object, Scene, World};
 use veduta_geometry::{DMat4, DVec3, DVec4};
 
@@ -230,7 +230,7 @@ impl City<'_, '_, '_> {
             .iter()
             .filter_map(|(id, object)| Some((id.as_str(), object.parents.first()?.as_str())))
             .collect();
-        let shown = self.choose(objects);
+        let shown = self.choose(objects)?;
         for ((id, object), shown) in objects.iter().zip(&shown) {
             if shown.is_empty() {
                 continue;
@@ -299,14 +299,14 @@ impl City<'_, '_, '_> {
 
     /// For each object, which of its geometries are shown: those of one level of detail, and none
     /// of a whole whose parts are more detailed.
-    fn choose(&mut self, objects: &[(String, CityObject)]) -> Vec<Vec<usize>> {
+    fn choose(&mut self, objects: &[(String, CityObject)]) -> Result<Vec<Vec<usize>>, Fault> {
         let mut chosen: Vec<Option<LevelOfDetail>> = Vec::with_capacity(objects.len());
         let mut shown = Vec::with_capacity(objects.len());
         for (id, object) in objects {
             let mut levels = Vec::new();
             for (index, geometry) in object.geometry.iter().enumerate() {
                 let place = || format!("CityObjects.{id}.geometry[{index}]");
-                if let Some(level) = self.level_of(geometry, place) {
+                if let Some(level) = self.level_of(geometry, place)? {
                     levels.push((index, level));
                 }
             }
@@ -335,7 +335,7 @@ impl City<'_, '_, '_> {
                 shown[parent].clear();
             }
         }
-        shown
+        Ok(shown)
     }
 
     /// The level of detail of a geometry that has surfaces.
@@ -343,10 +343,16 @@ impl City<'_, '_, '_> {
         &mut self,
         geometry: &Geometry,
         place: impl Fn() -> String,
-    ) -> Option<LevelOfDetail> {
+    ) -> Result<Option<LevelOfDetail>, Fault> {
         if matches!(geometry.kind.as_str(), "MultiPoint" | "MultiLineString") {
             self.shared.losses.points_and_lines.add(place);
-            return None;
+            return Ok(None);
+        }
+        if geometry.kind != INSTANCE && depth_of(&geometry.kind).is_none() {
+            let found = format!("{:?}", shortened(&geometry.kind));
+            let expected = "a type of geometry of CityJSON, such as Solid or MultiSurface";
+            let problem = Problem::Illegal { found, expected };
+            return Err(at(problem, || format!("{}.type", place())));
         }
         let mut leveled = geometry;
         if geometry.kind == INSTANCE {
@@ -357,7 +363,7 @@ impl City<'_, '_, '_> {
                 .unwrap_or(geometry);
         }
         let level = leveled.lod.as_ref().map(|lod| lod.to_string().parse());
-        Some(match level {
+        Ok(Some(match level {
             Some(Ok(level)) => level,
             lost => {
                 if lost.is_some() {
@@ -369,7 +375,7 @@ impl City<'_, '_, '_> {
                     refinement: None,
                 }
             }
-        })
+        }))
     }
 
     /// The mesh of a template's instance, and where it stands.

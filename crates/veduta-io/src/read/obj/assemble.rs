@@ -1,7 +1,7 @@
 //! Flat tables -> a mesh for each group.
 
 use super::parse::{Corner, NONE, Parsed, Run};
-use crate::read::finish::face_normal;
+use crate::read::finish::{face_normal, push_face};
 use crate::read::vertices::Combinations;
 use veduta::map::MaterialId;
 use veduta::scene::Mesh;
@@ -15,9 +15,6 @@ pub struct Assembler<'a> {
     /// The vertices of a face.
     face: Vec<u32>,
 }
-
-/// Difference of normals that counts as rounding: a polygon whose normals differ by less is flat.
-const SAME_NORMAL: f32 = 1e-5;
 
 impl<'a> Assembler<'a> {
     pub fn new(parsed: &'a Parsed) -> Self {
@@ -107,24 +104,5 @@ impl<'a> Assembler<'a> {
             mesh.colors.push(color);
         }
         vertex
-    }
-}
-
-/// Adds a face; as triangles where its normals or colours change over it.
-fn push_face(mesh: &mut Mesh, face: &[u32]) {
-    let first = face[0] as usize;
-    let is_flat = |&vertex: &u32| {
-        let vertex = vertex as usize;
-        let normals = mesh.normals.get(first).zip(mesh.normals.get(vertex));
-        let colors = mesh.colors.get(first).zip(mesh.colors.get(vertex));
-        normals.is_none_or(|(n, m)| n.abs_diff_eq(*m, SAME_NORMAL))
-            && colors.is_none_or(|(c, d)| c == d)
-    };
-    if face.len() == 3 || face.iter().all(is_flat) {
-        mesh.push_polygon(face);
-    } else {
-        for k in 2..face.len() {
-            mesh.push_polygon(&[face[0], face[k - 1], face[k]]);
-        }
     }
 }

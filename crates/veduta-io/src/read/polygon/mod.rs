@@ -133,7 +133,10 @@ impl PolygonCutter {
                 break;
             }
         }
-        if cut == Cut::Sound {
+        if cut == Cut::Sound && triangles.is_empty() {
+            // All corners lie on a line, but for rounding.
+            cut = Cut::NoArea;
+        } else if cut == Cut::Sound {
             for part in convex_parts::join(shape, &triangles) {
                 emit_part(polygon, &self.flat, &part, &mut emit);
             }
