@@ -272,7 +272,10 @@ fn a_texture_that_goes_unevenly_cuts_a_polygon() {
         .iter()
         .map(|p| Vec2::new(0.3 + 0.5 * p.x as f32, 0.7 * p.x as f32 - p.y as f32))
         .collect();
-    assert_eq!(parts_of(&[points.clone()], &even, 1e-9).len(), 1);
+    assert_eq!(
+        parts_of(std::slice::from_ref(&points), &even, 1e-9).len(),
+        1
+    );
     let mut uneven = even;
     uneven[3].x += 0.01;
     assert_eq!(parts_of(&[points], &uneven, 1e-9).len(), 2);
