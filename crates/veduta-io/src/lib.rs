@@ -7,16 +7,30 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
-#[cfg(any(feature = "gltf", feature = "obj"))]
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "stl",
+    feature = "ply",
+    feature = "cityjson"
+))]
 mod read;
 pub mod tone;
 mod write;
 
-#[cfg(any(feature = "gltf", feature = "obj"))]
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "stl",
+    feature = "ply",
+    feature = "cityjson"
+))]
 pub use read::{
     ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
     read_scene,
 };
+#[cfg(feature = "cityjson")]
+pub use read::{LevelOfDetail, LevelOfDetailError};
 pub use write::{
     PICTURE_SUFFIXES, PictureFormat, PictureOptions, PngDepth, WriteError, WriteProblem,
     remove_unfinished, write_picture,

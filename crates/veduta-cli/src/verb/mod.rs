@@ -37,7 +37,11 @@ fn load(
 ) -> Result<Scene, Failure> {
     talk.begin("reading");
     let up_axis = up_axis.map(UpAxis::from);
-    let loaded = read_scene(path, &ReadOptions { up_axis })?;
+    let options = ReadOptions {
+        up_axis,
+        ..ReadOptions::default()
+    };
+    let loaded = read_scene(path, &options)?;
     talk.end();
     for warning in &loaded.warnings {
         if strict {

@@ -24,6 +24,7 @@ impl ReadError {
             Problem::Unreadable(_) => ErrorKind::InputOutput,
             Problem::UnknownFormat { .. }
             | Problem::Version { .. }
+            | Problem::PointCloud { .. }
             | Problem::RequiredExtension { .. }
             | Problem::RemoteUri(_) => ErrorKind::Unsupported,
             Problem::NotThere { .. } | Problem::NoBinChunk => ErrorKind::Missing,
@@ -56,6 +57,13 @@ pub enum Place {
     Byte(u64),
     /// A path into a JSON document, such as `meshes[3].primitives[0].indices`.
     Json(String),
+    /// A path into the JSON document on a line of a file of such lines.
+    JsonInLine {
+        /// The line, counted from 1.
+        line: u64,
+        /// The path.
+        path: String,
+    },
 }
 
 impl fmt::Display for Place {
@@ -66,6 +74,7 @@ impl fmt::Display for Place {
             Place::Line(line) => write!(f, ":{line}"),
             Place::Byte(offset) => write!(f, ": byte {offset}"),
             Place::Json(path) => write!(f, ": {path}"),
+            Place::JsonInLine { line, path } => write!(f, ":{line}: {path}"),
         }
     }
 }
@@ -114,6 +123,14 @@ pub enum Problem {
     /// The JSON does not parse, or not to what glTF asks for.
     #[error("is not valid glTF: {0}")]
     Json(String),
+    /// The file breaks the grammar of its format.
+    #[error("is not valid {format}: {found}")]
+    NotValid {
+        /// The format.
+        format: &'static str,
+        /// What is wrong.
+        found: String,
+    },
     /// The file says that it cannot be understood without an extension.
     #[error("the extension {name} is required but not supported; {mend}")]
     RequiredExtension {
@@ -231,6 +248,14 @@ pub enum Problem {
         index: i64,
         /// How many were given before.
         count: usize,
+    },
+    /// Points without faces.
+    #[error(
+        "has {points} points but no faces; make a surface of them first, for example in MeshLab"
+    )]
+    PointCloud {
+        /// How many points.
+        points: usize,
     },
     /// A face with too few or too many corners.
     #[error("a face with {found} corners, expected 3 to {most}")]

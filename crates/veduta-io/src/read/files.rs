@@ -1,10 +1,24 @@
 //! Files that belong to a scene's file, and how messages quote them.
 
-use std::fs::File;
-use std::io::{self, Read};
-use std::path::Path;
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "ply",
+    feature = "cityjson"
+))]
+use std::{
+    fs::File,
+    io::{self, Read},
+    path::Path,
+};
 
 /// A file's bytes, if it is a file: devices and pipes might never end.
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "ply",
+    feature = "cityjson"
+))]
 pub(crate) fn read_whole(path: &Path) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let metadata = file.metadata()?;

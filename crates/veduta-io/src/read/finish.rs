@@ -92,6 +92,30 @@ pub(crate) fn face_normal(mesh: &Mesh, corners: [u32; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize_or_zero()
 }
 
+/// Difference of normals that counts as rounding: a polygon whose normals differ by less is flat.
+#[cfg(any(feature = "obj", feature = "ply"))]
+const SAME_NORMAL: f32 = 1e-5;
+
+/// Adds a face; as triangles where its normals or colours change over it.
+#[cfg(any(feature = "obj", feature = "ply"))]
+pub(crate) fn push_face(mesh: &mut Mesh, face: &[u32]) {
+    let first = face[0] as usize;
+    let is_flat = |&vertex: &u32| {
+        let vertex = vertex as usize;
+        let normals = mesh.normals.get(first).zip(mesh.normals.get(vertex));
+        let colors = mesh.colors.get(first).zip(mesh.colors.get(vertex));
+        normals.is_none_or(|(n, m)| n.abs_diff_eq(*m, SAME_NORMAL))
+            && colors.is_none_or(|(c, d)| c == d)
+    };
+    if face.len() == 3 || face.iter().all(is_flat) {
+        mesh.push_polygon(face);
+    } else {
+        for k in 2..face.len() {
+            mesh.push_polygon(&[face[0], face[k - 1], face[k]]);
+        }
+    }
+}
+
 /// Turns a scene in the axes of its file to the world, in which Z is up and the front is -Y.
 pub(crate) fn turn_up(scene: &mut Scene, up: UpAxis) {
     let world_from_file = match up {

@@ -6,17 +6,37 @@
 //! that Z is up, `picture` decodes textures, `budget` bounds memory.
 
 mod budget;
+#[cfg(feature = "cityjson")]
+mod cityjson;
 mod error;
 mod files;
 mod finish;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(feature = "gltf")]
+#[cfg(any(feature = "gltf", feature = "cityjson", feature = "stl"))]
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "ply",
+    feature = "cityjson"
+))]
 mod picture;
+#[cfg(feature = "ply")]
+mod ply;
+#[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
+mod polygon;
+#[cfg(feature = "stl")]
+mod stl;
+#[cfg(any(feature = "obj", feature = "ply", feature = "stl"))]
+mod text;
+#[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
+mod vertices;
 
+#[cfg(feature = "cityjson")]
+pub use cityjson::{LevelOfDetail, LevelOfDetailError};
 pub use error::{ErrorKind, Place, Problem, ReadError, Warning};
 
 use budget::Budget;
@@ -40,6 +60,10 @@ pub enum UpAxis {
 pub struct ReadOptions {
     /// The axis that points upwards; `None` for what is usual in the format.
     pub up_axis: Option<UpAxis>,
+    /// The level of detail of city models: of each object the highest up to this, or else the
+    /// lowest; `None` for the highest.
+    #[cfg(feature = "cityjson")]
+    pub level_of_detail: Option<LevelOfDetail>,
 }
 
 /// A scene, and what was read otherwise than the file asks for.
@@ -59,6 +83,18 @@ pub const SCENE_SUFFIXES: &[&str] = &[
     "gltf",
     #[cfg(feature = "obj")]
     "obj",
+    #[cfg(feature = "ply")]
+    "ply",
+    #[cfg(feature = "stl")]
+    "stl",
+    #[cfg(feature = "cityjson")]
+    "city.json",
+    #[cfg(feature = "cityjson")]
+    "city.jsonl",
+    #[cfg(feature = "cityjson")]
+    "json",
+    #[cfg(feature = "cityjson")]
+    "jsonl",
 ];
 
 /// Reads a scene from a file and the files it names.
@@ -87,6 +123,12 @@ enum Format {
     Gltf,
     #[cfg(feature = "obj")]
     Obj,
+    #[cfg(feature = "ply")]
+    Ply,
+    #[cfg(feature = "stl")]
+    Stl,
+    #[cfg(feature = "cityjson")]
+    CityJson,
 }
 
 impl Format {
@@ -98,17 +140,43 @@ impl Format {
             Some("glb" | "gltf") => return Ok(Some(Self::Gltf)),
             #[cfg(feature = "obj")]
             Some("obj") => return Ok(Some(Self::Obj)),
+            #[cfg(feature = "ply")]
+            Some("ply") => return Ok(Some(Self::Ply)),
+            #[cfg(feature = "stl")]
+            Some("stl") => return Ok(Some(Self::Stl)),
+            #[cfg(feature = "cityjson")]
+            Some("json" | "jsonl") => return Ok(Some(Self::CityJson)),
             _ => {}
         }
         let mut start = Vec::new();
         File::open(path)
-            .and_then(|file| file.take(4).read_to_end(&mut start))
+            .and_then(|file| file.take(512).read_to_end(&mut start))
             .map_err(Problem::Unreadable)?;
         Ok(match start.as_slice() {
             #[cfg(feature = "gltf")]
-            gltf::MAGIC => Some(Self::Gltf),
+            start if start.starts_with(gltf::MAGIC) => Some(Self::Gltf),
+            #[cfg(feature = "ply")]
+            start if start.starts_with(ply::MAGIC) => Some(Self::Ply),
+            #[cfg(feature = "stl")]
+            start if stl::is_text(start) => Some(Self::Stl),
             _ => None,
         })
+    }
+
+    /// The axis that points upwards in most files.
+    fn usual_up(&self) -> UpAxis {
+        match self {
+            #[cfg(feature = "gltf")]
+            Self::Gltf => UpAxis::Y,
+            #[cfg(feature = "obj")]
+            Self::Obj => UpAxis::Y,
+            #[cfg(feature = "ply")]
+            Self::Ply => UpAxis::Z,
+            #[cfg(feature = "stl")]
+            Self::Stl => UpAxis::Z,
+            #[cfg(feature = "cityjson")]
+            Self::CityJson => UpAxis::Z,
+        }
     }
 }
 
@@ -127,8 +195,18 @@ fn read(path: &Path, options: &ReadOptions, warnings: &mut Warnings) -> Result<S
         Format::Gltf => gltf::read(path, &bytes, &mut budget, warnings)?,
         #[cfg(feature = "obj")]
         Format::Obj => obj::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "ply")]
+        Format::Ply => ply::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "stl")]
+        Format::Stl => stl::read(path, &bytes, &mut budget, warnings)?,
+        #[cfg(feature = "cityjson")]
+        Format::CityJson => {
+            let level = options.level_of_detail;
+            cityjson::read(path, &bytes, level, &mut budget, warnings)?
+        }
     };
-    finish::turn_up(&mut scene, options.up_axis.unwrap_or(UpAxis::Y));
+    let up = options.up_axis.unwrap_or_else(|| format.usual_up());
+    finish::turn_up(&mut scene, up);
     finish::check_reach(&scene).map_err(whole)?;
     Ok(scene)
 }

@@ -1,6 +1,7 @@
 //! Files with damage of every small kind: each is read or refused, in bounded memory, without panic.
 
 use crate::support::{Folder, Glb, small_png};
+use crate::{cityjson, ply, stl};
 use peak_alloc::PeakAlloc;
 use serde_json::{Value, json};
 use veduta::scene::Scene;
@@ -309,6 +310,28 @@ fn an_obj_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
 }
 
 #[test]
+fn an_stl_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    read_damaged(
+        "m.stl",
+        &stl::binary(b"COLOR=\x00\xff\x00\xff", [1, 0x8000, 3, 4]),
+    );
+    read_damaged("m.stl", stl::text("part").as_bytes());
+}
+
+#[test]
+fn a_ply_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    for file in ply::rich() {
+        read_damaged("m.ply", &file);
+    }
+}
+
+#[test]
+fn cityjson_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    read_damaged("m.city.json", cityjson::house().to_string().as_bytes());
+    read_damaged("m.city.jsonl", cityjson::sequence().as_bytes());
+}
+
+#[test]
 fn json_with_wrong_values_anywhere_is_read_or_refused() {
     read_wrong_values(&rich_glb());
 }
@@ -330,8 +353,25 @@ fn json_of_compressed_primitives_with_wrong_values_anywhere_is_read_or_refused()
     read_wrong_values(&Glb::from_bytes(crate::compressed::EDGEBREAKER));
 }
 
+#[test]
+fn cityjson_with_wrong_values_anywhere_is_read_or_refused() {
+    let to_bytes = |json: &Value| json.to_string().into_bytes();
+    read_with_wrong_values("m.city.json", &cityjson::rich(), to_bytes);
+}
+
 fn read_wrong_values(sound: &Glb) {
+    read_with_wrong_values("m.glb", &sound.json, |json| {
+        let bin = sound.bin.clone();
+        let json = json.clone();
+        Glb { json, bin }.bytes()
+    });
+}
+
+/// Reads files that are sound but for up to four values. `VEDUTA_DAMAGE` asks for another number of
+/// them.
+fn read_with_wrong_values(name: &str, sound: &Value, bytes_of: impl Fn(&Value) -> Vec<u8>) {
     let folder = Folder::new();
+    assert!(check(name, folder.read(name, bytes_of(sound)), "undamaged"));
     let values = [
         json!(0),
         json!(1),
@@ -354,21 +394,21 @@ fn read_wrong_values(sound: &Glb) {
         json!(true),
         json!([0, 0, 0, 0]),
     ];
+    let asked = std::env::var("VEDUTA_DAMAGE").ok();
+    let cases = asked.map_or(6000, |asked| asked.parse().expect("a number of variants"));
     let mut read = 0;
-    const CASES: usize = 6000;
-    for seed in 0..CASES {
+    for seed in 0..cases {
         let mut random = Random(seed as u64);
-        let mut glb = sound.clone();
+        let mut json = sound.clone();
         for _ in 0..=random.below(3) {
-            damage(&mut glb.json, &values, &mut random);
+            damage(&mut json, &values, &mut random);
         }
-        let json = &glb.json;
         let case = format!("seed {seed}: {json}");
-        read += usize::from(check("m.glb", folder.read("m.glb", glb.bytes()), case));
+        read += usize::from(check(name, folder.read(name, bytes_of(&json)), case));
     }
     assert!(
-        read > 0 && read < CASES,
-        "{read} of {CASES} damaged files were read"
+        read > 0 && read < cases,
+        "{read} of {cases} damaged files were read"
     );
     let peak = MEMORY.peak_usage();
     assert!(peak < MOST_MEMORY, "{peak} bytes");

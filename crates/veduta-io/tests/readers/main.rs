@@ -1,10 +1,13 @@
 //! What the readers make of files: sound ones, wrong ones, damaged ones and real ones.
 
+mod cityjson;
 #[cfg(feature = "meshopt")]
 mod compressed;
 mod damaged;
 mod gltf;
 mod gltf_poses;
 mod obj;
+mod ply;
 mod real_models;
+mod stl;
 mod support;

@@ -66,7 +66,7 @@ fn corners_without_attributes_get_plain_ones_beside_corners_with_them() {
 }
 
 #[test]
-fn polygons_concave_ones_too_are_cut_into_triangles() {
+fn concave_polygons_are_cut_within_their_outline() {
     let dart = "v 0 0 5\nv 2 1 5\nv 0 2 5\nv 1 1 5\nf -4 -3 -2 -1\n";
     let mesh = &scene(dart).meshes[0];
     let area = |corners: &[u32; 3]| {
@@ -76,6 +76,92 @@ fn polygons_concave_ones_too_are_cut_into_triangles() {
     let areas: Vec<f64> = mesh.triangles.iter().map(area).collect();
     // The dart has area 1; the fan from its first corner would give 1.5 and -0.5.
     assert_eq!(areas, [0.5, 0.5]);
+}
+
+#[test]
+fn planar_polygons_stay_one_face_and_bent_ones_become_triangles() {
+    let faces = |text: &str| {
+        let mesh = &scene(text).meshes[0];
+        let corners = |face| mesh.corners_of(face).count();
+        (0..mesh.face_count() as u32)
+            .map(corners)
+            .collect::<Vec<_>>()
+    };
+    // In national coordinates, with three decimals.
+    let wall = "v 84616.468 447423.000 0\nv 84620.468 447426.000 0\nv 84620.468 447426.000 3.2\n\
+        v 84618.468 447424.500 4.7\nv 84616.468 447423.000 3.2\nf 1 2 3 4 5\n";
+    assert_eq!(faces(wall), [5]);
+    let bent = format!("{SQUARE}v 0 1 0.1\nf 1 2 3 5\nf 1 2 3 4\nf 1 2 3\n");
+    assert_eq!(faces(&bent), [3, 3, 4, 3]);
+    // An L becomes two parts.
+    let l = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4 5 6\n";
+    assert_eq!(faces(l).len(), 2);
+}
+
+#[test]
+fn a_polygon_over_which_normals_colours_or_textures_bend_becomes_triangles() {
+    let count = |text: &str| scene(text).face_count();
+    let normals = "vn 0 0 1\nvn 1 0 1\n";
+    assert_eq!(
+        count(&format!("{SQUARE}{normals}f 1//1 2//1 3//1 4//1\n")),
+        1
+    );
+    assert_eq!(
+        count(&format!("{SQUARE}{normals}f 1//1 2//1 3//2 4//2\n")),
+        2
+    );
+    let colored = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 0 0 1\nf 1 2 3 4\n";
+    assert_eq!(count(colored), 2);
+    let texcoords = "vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nvt 0 1\n";
+    let textured = |last| format!("{SQUARE}{texcoords}f 1/1 2/2 3/3 4/{last}\n");
+    assert_eq!((count(&textured(4)), count(&textured(5))), (1, 2));
+}
+
+#[test]
+fn smoothing_groups_give_normals_to_faces_without_them() {
+    // A roof of two slopes: smooth in one group, creased between two, flat without.
+    let roof = "v -1 0 0\nv -1 1 0\nv 0 0 1\nv 0 1 1\nv 1 0 0\nv 1 1 0\n";
+    let (left, right) = ("f 1 3 4 2\n", "f 3 5 6 4\n");
+    let normals = |text: String| scene(&format!("{roof}{text}")).meshes[0].normals.clone();
+    assert!(normals(format!("{left}{right}")).is_empty());
+    assert!(normals(format!("s off\n{left}s 0\n{right}")).is_empty());
+
+    let slope = Vec3::new(1.0, 0.0, 1.0).normalize();
+    let close = |a: Vec3, b: Vec3| a.abs_diff_eq(b, 1e-6);
+    let smooth = normals(format!("s 1\n{left}{right}"));
+    assert_eq!(smooth.len(), 6, "vertices are shared");
+    assert_eq!(smooth.iter().filter(|&&n| close(n, Vec3::Z)).count(), 2);
+    let creased = normals(format!("s 1\n{left}s 2\n{right}"));
+    assert_eq!(creased.len(), 8);
+    assert_eq!(creased.iter().filter(|&&n| close(n, slope)).count(), 4);
+    // Normals of the file come first, and polygons that are not bent by theirs stay whole.
+    let given = scene(&format!("{roof}vn 0 0 1\ns 1\nf 1//1 3//1 4//1 2//1\n"));
+    assert_eq!(given.meshes[0].normals, [Vec3::Z; 4]);
+    assert_eq!(
+        scene(&format!("{roof}s 1\n{left}s 2\n{right}")).face_count(),
+        2
+    );
+}
+
+#[test]
+fn a_smooth_surface_is_smooth_across_groups_and_materials() {
+    let roof = "v -1 0 0\nv -1 1 0\nv 0 0 1\nv 0 1 1\nv 1 0 0\nv 1 1 0\n";
+    let scene = scene(&format!("{roof}s 1\ng a\nf 1 3 4 2\ng b\nf 3 5 6 4\n"));
+    for mesh in &scene.meshes {
+        let up = mesh.normals.iter().filter(|n| n.abs_diff_eq(Vec3::Z, 1e-6));
+        assert_eq!(up.count(), 2);
+    }
+}
+
+#[test]
+fn a_thousand_smoothing_groups_at_one_corner_are_told_apart() {
+    let mut text = String::from(SQUARE);
+    for group in 1..=1000 {
+        text.push_str(&format!("s {group}\nf 1 2 3\nf 1 3 2\n"));
+    }
+    // Two faces that turn their backs on each other leave no direction.
+    let mesh = &scene(&text).meshes[0];
+    assert_eq!(mesh.normals.len(), 3000);
 }
 
 #[test]

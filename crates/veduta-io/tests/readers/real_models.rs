@@ -1,6 +1,7 @@
 //! Models that other people made. They stand outside the project, in the folder that `VEDUTA_DATA`
 //! names; without it these tests say that they skip.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use veduta::scene::{Bounds, Scene};
 use veduta_io::{ReadOptions, UpAxis, read_scene};
@@ -68,6 +69,90 @@ fn every_model_has_all_its_faces_objects_materials_and_pictures() {
     );
 }
 
+/// A city, without word of its warnings.
+fn city(name: &str) -> Option<Scene> {
+    let path = models()?.parent()?.join("city").join(name);
+    let loaded = read_scene(&path, &ReadOptions::default());
+    Some(loaded.unwrap_or_else(|error| panic!("{error}")).scene)
+}
+
+/// Numbers of faces by the name of their material.
+fn faces_by_material(scene: &Scene) -> BTreeMap<&str, usize> {
+    let mut counts = BTreeMap::new();
+    for object in &scene.objects {
+        let mesh = &scene.meshes[object.mesh.0 as usize];
+        for face in 0..mesh.face_count() as u32 {
+            let material = scene.material(mesh.material_of(face));
+            *counts.entry(material.name.as_str()).or_default() += 1;
+        }
+    }
+    counts
+}
+
+#[test]
+fn the_surfaces_of_delft_tell_apart_and_no_wall_is_missing() {
+    let Some(scene) = city("delft.city.json") else {
+        return;
+    };
+    assert_eq!(scene.world.crs.as_deref(), Some("EPSG:7415"));
+    assert_eq!(scene.objects.len(), 570);
+    // All 36,271 triangles but three that are a line.
+    assert_eq!(scene.face_count(), 36_268);
+    let counts = faces_by_material(&scene);
+    let expected = [
+        ("Bridge", 101),
+        ("GenericCityObject", 2278),
+        ("LandUse", 8016),
+        ("PlantCover", 15_693),
+        ("Road", 4112),
+        ("RoofSurface", 1283),
+        ("WallSurface", 4280),
+        ("WaterBody", 505),
+    ];
+    assert_eq!(counts, BTreeMap::from(expected));
+    let mut roofs_without_wall = 0;
+    for object in &scene.objects {
+        let mesh = &scene.meshes[object.mesh.0 as usize];
+        let mut edges: BTreeMap<(u32, u32), (u32, bool)> = BTreeMap::new();
+        for face in 0..mesh.face_count() as u32 {
+            let is_roof = scene.material(mesh.material_of(face)).name == "RoofSurface";
+            let corners: Vec<u32> = mesh.corners_of(face).collect();
+            for (k, &a) in corners.iter().enumerate() {
+                let b = corners[(k + 1) % corners.len()];
+                let edge = edges.entry((a.min(b), a.max(b))).or_default();
+                edge.0 += 1;
+                edge.1 |= is_roof;
+            }
+        }
+        roofs_without_wall += edges.values().filter(|edge| **edge == (1, true)).count();
+    }
+    assert_eq!(roofs_without_wall, 0);
+}
+
+#[test]
+fn the_polygons_of_rotterdam_stay_polygons() {
+    let Some(scene) = city("rotterdam_subset.city.json") else {
+        return;
+    };
+    assert_eq!(scene.world.crs, None);
+    assert_eq!(scene.objects.len(), 16);
+    let mut corners: BTreeMap<usize, usize> = BTreeMap::new();
+    for mesh in &scene.meshes {
+        for face in 0..mesh.face_count() as u32 {
+            *corners.entry(mesh.corners_of(face).count()).or_default() += 1;
+        }
+    }
+    // Of 248 surfaces 12 are a line; concave ones are more than one face.
+    let expected = [(3, 49), (4, 232), (5, 24), (6, 5), (7, 1), (8, 2)];
+    assert_eq!(corners, BTreeMap::from(expected));
+    let kinds = [
+        ("GroundSurface", 45),
+        ("RoofSurface", 89),
+        ("WallSurface", 179),
+    ];
+    assert_eq!(faces_by_material(&scene), BTreeMap::from(kinds));
+}
+
 #[test]
 fn models_stand_upright_and_face_minus_y() {
     let Some(models) = models() else { return };
@@ -82,6 +167,7 @@ fn models_stand_upright_and_face_minus_y() {
     // As Z up, the spot's height lies along Y, as in its file.
     let z_up = ReadOptions {
         up_axis: Some(UpAxis::Z),
+        ..ReadOptions::default()
     };
     let spot = read_scene(&models.join("spot.obj"), &z_up)
         .expect("spot")

@@ -26,6 +26,7 @@ impl Folder {
     pub fn read(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<Loaded, ReadError> {
         let options = ReadOptions {
             up_axis: Some(UpAxis::Z),
+            ..ReadOptions::default()
         };
         read_scene(&self.write(name, bytes), &options)
     }

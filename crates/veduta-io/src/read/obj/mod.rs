@@ -1,17 +1,19 @@
 //! Wavefront OBJ, with its material libraries.
 //!
-//! Bytes -> [`mod@parse`] (flat tables, faces cut into triangles by [`polygon`]) -> [`assemble`] (a mesh
-//! for each group) and [`mtl`] (materials) -> scene.
+//! Bytes -> [`mod@parse`] (flat tables, faces cut into convex ones by [`polygon`](super::polygon)) ->
+//! [`smooth`] (normals of smoothing groups) -> [`assemble`] (a mesh for each group) and [`mtl`]
+//! (materials) -> scene.
 //!
 //! Our own rather than the `tobj` crate, whose errors do not tell the line and which cuts every
 //! polygon as if it were convex.
 //!
-//! Smoothing groups are not applied: a model without normals is shown with flat faces.
+//! Faces without normals are smooth within their smoothing group (`s`), and flat outside of one.
+//! A polygon over which normals or colours change becomes triangles.
 
 mod assemble;
 mod mtl;
 mod parse;
-mod polygon;
+mod smooth;
 
 use super::budget::Budget;
 use super::error::{Fault, Place, Problem, Warnings};
@@ -32,16 +34,17 @@ pub(crate) fn read(
     budget: &mut Budget,
     warnings: &mut Warnings,
 ) -> Result<Scene, Fault> {
-    let parsed = parse(bytes, budget, warnings)?;
+    let mut parsed = parse(bytes, budget, warnings)?;
     if parsed.positions.is_empty() && !bytes.is_empty() {
         return Err(Problem::Lacks("vertices; it may be no OBJ file").at(Place::Whole));
     }
+    smooth::give_normals(&mut parsed);
     let mut scene = Scene::default();
     let material_ids = read_materials(path, &parsed, &mut scene, warnings);
 
     let mut runs_of_group: Vec<Vec<(Run, usize)>> = vec![Vec::new(); parsed.groups.len()];
     let ends = parsed.runs.iter().skip(1).map(|run| run.first);
-    for (&run, end) in parsed.runs.iter().zip(ends.chain([parsed.triangles.len()])) {
+    for (&run, end) in parsed.runs.iter().zip(ends.chain([parsed.faces.len()])) {
         runs_of_group[run.group].push((run, end));
     }
     let mut assembler = Assembler::new(&parsed);

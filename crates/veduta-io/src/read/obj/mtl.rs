@@ -3,10 +3,10 @@
 //! Kept are `Kd`, `Ke`, `d` or `Tr`, and `map_Kd` with its offset, scale and clamp. Colours are
 //! linear. Faces are seen from both sides: OBJ knows no back.
 
-use super::parse::{Tokens, text};
 use crate::read::error::{Place, Problem, Warnings};
 use crate::read::files::read_whole;
 use crate::read::picture::PictureDecoder;
+use crate::read::text::{Tokens, text};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use veduta::scene::{AlphaMode, Image, ImageId, Material, TextureRef, Wrap};

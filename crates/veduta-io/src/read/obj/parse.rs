@@ -2,16 +2,16 @@
 //!
 //! A line at a time, without copies: a file of a million faces is read in a fraction of a second.
 
-use super::polygon::Triangulator;
 use crate::read::budget::Budget;
 use crate::read::error::{Fault, Place, Problem, Warnings};
 use crate::read::files::shortened;
-use memchr::memchr;
+use crate::read::polygon::{Cut, Polygon, PolygonCutter, usual_rounding};
+use crate::read::text::{Tokens, next_line, number, text, wrong_token};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use veduta_geometry::{DVec3, Vec2, Vec3};
 
-/// What a file says, faces cut into triangles.
+/// What a file says, faces cut into convex ones.
 #[derive(Debug, Default)]
 pub struct Parsed {
     pub positions: Vec<DVec3>,
@@ -19,8 +19,8 @@ pub struct Parsed {
     pub colors: Vec<[f32; 3]>,
     pub texcoords: Vec<Vec2>,
     pub normals: Vec<Vec3>,
-    pub triangles: Vec<[Corner; 3]>,
-    /// Consecutive triangles of one group and material.
+    pub faces: Faces,
+    /// Consecutive faces of one group, material and smoothing group.
     pub runs: Vec<Run>,
     /// Names of the groups; no two are equal.
     pub groups: Vec<String>,
@@ -43,12 +43,65 @@ pub struct Corner {
 /// The index of nothing.
 pub const NONE: u32 = u32::MAX;
 
-/// Triangles from `first` up to the next run.
+/// Faces from `first` up to the next run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     pub first: usize,
     pub group: usize,
     pub material: usize,
+    /// 0 for none.
+    pub smoothing: u32,
+}
+
+/// Convex faces of three corners or more.
+#[derive(Debug, Default)]
+pub struct Faces {
+    corners: Vec<Corner>,
+    /// Where the corners of each face end; empty as long as all faces are triangles.
+    ends: Vec<usize>,
+}
+
+impl Faces {
+    pub fn len(&self) -> usize {
+        if self.ends.is_empty() {
+            self.corners.len() / 3
+        } else {
+            self.ends.len()
+        }
+    }
+
+    /// The corners of a face.
+    #[inline]
+    pub fn corners(&self, face: usize) -> &[Corner] {
+        &self.corners[self.range(face)]
+    }
+
+    /// The corners of a face, to be changed.
+    #[inline]
+    pub fn corners_mut(&mut self, face: usize) -> &mut [Corner] {
+        let range = self.range(face);
+        &mut self.corners[range]
+    }
+
+    #[inline]
+    fn range(&self, face: usize) -> std::ops::Range<usize> {
+        if self.ends.is_empty() {
+            return 3 * face..3 * face + 3;
+        }
+        let start = face.checked_sub(1).map_or(0, |before| self.ends[before]);
+        start..self.ends[face]
+    }
+
+    fn push(&mut self, corners: impl ExactSizeIterator<Item = Corner>) {
+        if corners.len() != 3 && self.ends.is_empty() {
+            self.ends = (1..=self.len()).map(|face| 3 * face).collect();
+        }
+        let is_uneven = corners.len() != 3 || !self.ends.is_empty();
+        self.corners.extend(corners);
+        if is_uneven {
+            self.ends.push(self.corners.len());
+        }
+    }
 }
 
 /// The most corners of a face: none is known to have so many, and cutting it up costs their square.
@@ -82,14 +135,6 @@ pub fn parse(bytes: &[u8], budget: &mut Budget, warnings: &mut Warnings) -> Resu
     Ok(parser.parsed)
 }
 
-/// Cuts the next line off `rest`, without its end.
-fn next_line<'a>(rest: &mut &'a [u8]) -> &'a [u8] {
-    let end = memchr(b'\n', rest).unwrap_or(rest.len());
-    let line = &rest[..end];
-    *rest = rest.get(end + 1..).unwrap_or_default();
-    line.strip_suffix(b"\r").unwrap_or(line)
-}
-
 #[derive(Debug)]
 struct Parser<'a> {
     budget: &'a mut Budget,
@@ -101,9 +146,11 @@ struct Parser<'a> {
     /// Set when `object` or `group` have changed since the last face.
     group_index: Option<usize>,
     material: usize,
-    triangulator: Triangulator,
+    smoothing: u32,
+    cutter: PolygonCutter,
     corners: Vec<Corner>,
     points: Vec<DVec3>,
+    point_texcoords: Vec<Vec2>,
     skipped: Skipped,
 }
 
@@ -121,9 +168,11 @@ impl<'a> Parser<'a> {
             group: String::new(),
             group_index: None,
             material: 0,
-            triangulator: Triangulator::new(),
+            smoothing: 0,
+            cutter: PolygonCutter::new(),
             corners: Vec::new(),
             points: Vec::new(),
+            point_texcoords: Vec::new(),
             skipped: Skipped::default(),
         }
     }
@@ -137,6 +186,7 @@ struct Skipped {
     unknown: Count,
     first_unknown: String,
     too_few_corners: Count,
+    no_area: Count,
     crossing: Count,
 }
 
@@ -196,13 +246,23 @@ impl Parser<'_> {
                         count
                     });
             }
+            b"s" => {
+                // `off` or a number; some write `on`.
+                self.smoothing = match tokens.next_value() {
+                    None | Some(b"off") => 0,
+                    Some(token) => std::str::from_utf8(token)
+                        .ok()
+                        .and_then(|text| text.parse().ok())
+                        .unwrap_or(1),
+                }
+            }
             b"mtllib" => self.parsed.libraries.push((number, text(tokens))),
             b"l" | b"p" => self.skipped.points_and_lines.add(number),
             b"vp" | b"cstype" | b"deg" | b"bmat" | b"step" | b"curv" | b"curv2" | b"surf"
             | b"parm" | b"trim" | b"hole" | b"scrv" | b"sp" | b"end" | b"con" | b"bzp" | b"bsp"
             | b"cdc" | b"cdp" | b"res" => self.skipped.curves.add(number),
             // How to shade and display: not used here.
-            b"s" | b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"shadow_obj"
+            b"mg" | b"bevel" | b"c_interp" | b"d_interp" | b"lod" | b"shadow_obj"
             | b"trace_obj" | b"ctech" | b"stech" | b"usemap" | b"maplib" => {}
             _ if keyword.starts_with(b"#") => {}
             _ => {
@@ -259,22 +319,33 @@ impl Parser<'_> {
             return Ok(());
         }
         self.start_run()?;
-        let corners = &self.corners;
-        let triangles = &mut self.parsed.triangles;
-        if let [a, b, c] = corners[..] {
-            triangles.push([a, b, c]);
+        if found == 3 {
+            self.parsed.faces.push(self.corners.iter().copied());
             return Ok(());
         }
+        let (parsed, corners) = (&mut self.parsed, &self.corners);
         self.points.clear();
-        let positions = &self.parsed.positions;
-        self.points.extend(
-            corners
-                .iter()
-                .map(|corner| positions[corner.position as usize]),
-        );
-        let emit = |triangle: [usize; 3]| triangles.push(triangle.map(|corner| corners[corner]));
-        if !self.triangulator.triangulate(&self.points, emit) {
-            self.skipped.crossing.add(number);
+        let position = |corner: &Corner| parsed.positions[corner.position as usize];
+        self.points.extend(corners.iter().map(position));
+        self.point_texcoords.clear();
+        if corners.iter().any(|corner| corner.texcoord != NONE) {
+            let texcoord = |corner: &Corner| parsed.texcoords.get(corner.texcoord as usize);
+            let texcoords = corners.iter().map(|corner| texcoord(corner).copied());
+            self.point_texcoords
+                .extend(texcoords.map(Option::unwrap_or_default));
+        }
+        let polygon = Polygon {
+            points: &self.points,
+            ring_ends: &[found],
+            texcoords: &self.point_texcoords,
+            rounding: usual_rounding(&self.points),
+        };
+        let faces = &mut parsed.faces;
+        let emit = |face: &[usize]| faces.push(face.iter().map(|&corner| corners[corner]));
+        match self.cutter.cut(&polygon, emit) {
+            Cut::Sound => {}
+            Cut::NoArea => self.skipped.no_area.add(number),
+            Cut::Crossing => self.skipped.crossing.add(number),
         }
         Ok(())
     }
@@ -325,12 +396,14 @@ impl Parser<'_> {
             }
         };
         let run = Run {
-            first: self.parsed.triangles.len(),
+            first: self.parsed.faces.len(),
             group,
             material: self.material,
+            smoothing: self.smoothing,
         };
         let last = self.parsed.runs.last();
-        if last.is_none_or(|last| (last.group, last.material) != (run.group, run.material)) {
+        let of = |run: &Run| (run.group, run.material, run.smoothing);
+        if last.is_none_or(|last| of(last) != of(&run)) {
             self.parsed.runs.push(run);
         }
         Ok(())
@@ -359,6 +432,7 @@ impl Parser<'_> {
             skipped.too_few_corners,
             "a face has fewer than 3 corners; it is left out",
         );
+        warn(skipped.no_area, "a polygon has no area; it is left out");
         warn(
             skipped.crossing,
             "a face crosses itself; its triangles may overlap",
@@ -420,114 +494,6 @@ fn resolve(reference: i64, what: &'static str, count: usize) -> Result<u32, Prob
     }
 }
 
-/// The words of a line.
-pub struct Tokens<'a>(pub &'a [u8]);
-
-impl<'a> Iterator for Tokens<'a> {
-    type Item = &'a [u8];
-
-    #[inline]
-    fn next(&mut self) -> Option<&'a [u8]> {
-        let is_space = |byte: &u8| matches!(byte, b' ' | b'\t' | b'\r' | 0x0b | 0x0c);
-        let start = self.0.iter().position(|byte| !is_space(byte))?;
-        let rest = &self.0[start..];
-        let end = rest.iter().position(is_space).unwrap_or(rest.len());
-        self.0 = &rest[end..];
-        Some(&rest[..end])
-    }
-}
-
-impl<'a> Tokens<'a> {
-    /// The next word, unless a comment starts there.
-    pub fn next_value(&mut self) -> Option<&'a [u8]> {
-        self.next().filter(|token| !token.starts_with(b"#"))
-    }
-
-    pub fn number(&mut self, expected: &'static str) -> Result<f64, Problem> {
-        number(self.next_value().unwrap_or_default(), expected)
-    }
-
-    /// The next number, or `absent` at the end of the line.
-    pub fn number_or(&mut self, absent: f64) -> Result<f64, Problem> {
-        match self.next_value() {
-            None => Ok(absent),
-            Some(token) => number(token, "a number"),
-        }
-    }
-
-    pub fn three_numbers(&mut self) -> Result<[f64; 3], Problem> {
-        Ok([
-            self.number("three numbers")?,
-            self.number("three numbers")?,
-            self.number("three numbers")?,
-        ])
-    }
-}
-
-/// A finite number.
-#[inline]
-fn number(token: &[u8], expected: &'static str) -> Result<f64, Problem> {
-    if let Some(number) = plain_decimal(token) {
-        return Ok(number);
-    }
-    std::str::from_utf8(token)
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .filter(|number: &f64| number.is_finite())
-        .ok_or_else(|| wrong_token(token, expected))
-}
-
-/// The value of digits with at most a sign and a point, if it is found exactly without effort.
-///
-/// Up to 15 digits and the power of ten below them are exact in f64, so their quotient is rounded
-/// once, as it should be (Clinger, "How to read floating point numbers accurately", 1990). Most
-/// numbers of OBJ files are such, and most time would go into them.
-#[inline]
-fn plain_decimal(token: &[u8]) -> Option<f64> {
-    const POWERS: [f64; 16] = [
-        1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
-    ];
-    let (negative, digits) = match token.strip_prefix(b"-") {
-        Some(digits) => (true, digits),
-        None => (false, token),
-    };
-    // One of the 16 bytes may be the point.
-    if digits.len() > 16 {
-        return None;
-    }
-    let mut value = 0u64;
-    let mut count = 0;
-    let mut point = None;
-    for &byte in digits {
-        match byte {
-            b'0'..=b'9' => {
-                value = value * 10 + u64::from(byte - b'0');
-                count += 1;
-            }
-            b'.' if point.is_none() => point = Some(count),
-            _ => return None,
-        }
-    }
-    if count == 0 || count > 15 {
-        return None;
-    }
-    let magnitude = value as f64 / POWERS[count - point.unwrap_or(count)];
-    Some(if negative { -magnitude } else { magnitude })
-}
-
-fn wrong_token(token: &[u8], expected: &'static str) -> Problem {
-    let found = match token {
-        b"" => "end of line".into(),
-        _ => shortened(&String::from_utf8_lossy(token)),
-    };
-    Problem::Token { found, expected }
-}
-
-/// The rest of a line, which may hold spaces.
-pub fn text(tokens: Tokens<'_>) -> String {
-    String::from_utf8_lossy(tokens.0.trim_ascii()).into_owned()
-}
-
 /// The rest of a line as a name; a slash within it would look like two names.
 fn name(tokens: Tokens<'_>) -> String {
     text(tokens).replace('/', "_")
@@ -536,47 +502,6 @@ fn name(tokens: Tokens<'_>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_quick_way_to_a_number_equals_the_general_one() {
-        let mut state = 3u64;
-        for _ in 0..200_000 {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            let digits = (state >> 33) as usize % 15 + 1;
-            let point = (state >> 40) as usize % (digits + 1);
-            let mut text = format!("{:015}", (state >> 12) % 10u64.pow(15))[..digits].to_owned();
-            text.insert(point, '.');
-            if state & 2048 != 0 {
-                text.insert(0, '-');
-            }
-            let quick = plain_decimal(text.as_bytes()).expect(&text);
-            let general: f64 = text.parse().expect(&text);
-            assert_eq!(quick.to_bits(), general.to_bits(), "{text}");
-        }
-    }
-
-    #[test]
-    fn numbers_are_read_in_all_their_spellings_and_nothing_else_is() {
-        for (text, value) in [
-            ("1", 1.0),
-            ("-.5", -0.5),
-            ("2.", 2.0),
-            ("+3", 3.0),
-            ("-0", -0.0),
-            ("1e-3", 1e-3),
-            ("6.02E23", 6.02e23),
-            ("0.1234567890123456789", 0.123_456_789_012_345_68),
-        ] {
-            assert_eq!(number(text.as_bytes(), "").expect(text), value, "{text}");
-        }
-        for text in [
-            "", ".", "-", "1,5", "nan", "inf", "-inf", "1e999", "0x10", "1.2.3", "1\u{e9}",
-        ] {
-            assert!(number(text.as_bytes(), "a number").is_err(), "{text}");
-        }
-    }
 
     #[test]
     fn corners_are_read_in_all_their_spellings_and_nothing_else_is() {
