@@ -1,7 +1,7 @@
 //! How the command ends: what each exit code means, and the one way to fail.
 
 use std::fmt;
-use veduta_io::{ErrorKind, ReadError, WriteError, WriteProblem};
+use veduta_io::{ErrorKind, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem};
 
 /// Exit codes. `0` is success, `130` an interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,8 +60,19 @@ impl From<ReadError> for Failure {
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         let code = match error.problem {
-            WriteProblem::UnknownSuffix(_) => Code::Usage,
+            WriteProblem::UnknownSuffix(_) | WriteProblem::NoSuchSamples { .. } => Code::Usage,
             _ => Code::InputOutput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<ReadPictureError> for Failure {
+    fn from(error: ReadPictureError) -> Self {
+        let code = match error.problem {
+            PictureProblem::Unreadable(_) => Code::InputOutput,
+            PictureProblem::UnknownFormat(_) | PictureProblem::Unsupported(_) => Code::Unsupported,
+            _ => Code::BadInput,
         };
         Self::new(code, error.to_string())
     }

@@ -3,6 +3,7 @@
 //! A file for each verb, in `verb/`. Data goes to stdout, talk to stderr; how it ends is in `exit`.
 
 mod exit;
+mod preview;
 mod talk;
 mod values;
 mod verb;

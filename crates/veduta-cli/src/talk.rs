@@ -2,6 +2,7 @@
 
 use crate::exit::{Code, Failure};
 use clap::ValueEnum;
+use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
 use std::time::Instant;
 
@@ -25,7 +26,7 @@ pub struct Talk {
     quiet: bool,
     verbose: bool,
     style: ProgressStyle,
-    step: Option<(&'static str, Instant)>,
+    step: Option<(Cow<'static, str>, Instant)>,
     warnings: Vec<String>,
 }
 
@@ -46,8 +47,9 @@ impl Talk {
     }
 
     /// Says that a step begins, and the one before it is done.
-    pub fn begin(&mut self, step: &'static str) {
+    pub fn begin(&mut self, step: impl Into<Cow<'static, str>>) {
         self.end();
+        let step = step.into();
         match self.style {
             ProgressStyle::Bar => say(format_args!("\r\x1b[2Kveduta: {step} …")),
             ProgressStyle::Json => {
@@ -128,11 +130,13 @@ pub fn say_error(message: impl std::fmt::Display) {
 
 /// Writes data to stdout.
 pub fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(text.as_bytes())
+}
+
+/// Writes data to stdout.
+pub fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = io::stdout().lock();
-    match stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush())
-    {
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
         Ok(()) => Ok(()),
         // Who reads has read enough: `veduta info … | head`.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),

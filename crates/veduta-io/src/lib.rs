@@ -9,6 +9,8 @@
 
 #[cfg(any(feature = "gltf", feature = "obj"))]
 mod read;
+mod read_picture;
+mod scale;
 pub mod tone;
 mod write;
 
@@ -17,7 +19,9 @@ pub use read::{
     ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
     read_scene,
 };
+pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
+pub use scale::scaled;
 pub use write::{
-    PICTURE_SUFFIXES, PictureFormat, PictureOptions, PngDepth, WriteError, WriteProblem,
-    remove_unfinished, write_picture,
+    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteError,
+    WriteProblem, remove_unfinished, stream_picture, write_picture, write_picture_as,
 };

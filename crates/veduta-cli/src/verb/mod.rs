@@ -1,6 +1,8 @@
 //! The verbs, a file for each.
 
 pub mod info;
+mod look;
+mod output;
 pub mod render;
 
 use crate::exit::{Code, Failure};

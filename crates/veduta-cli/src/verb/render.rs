@@ -1,28 +1,29 @@
+use super::look::Look;
+use super::output::Output;
 use super::{UpAxisArgument, load};
 use crate::exit::{Code, Failure};
-use crate::talk::{Talk, print};
-use crate::values::{self, Background, FieldOfView, Size};
-use clap::{Args, ValueEnum};
+use crate::preview::Screen;
+use crate::talk::{Talk, print, print_bytes};
+use crate::values::{self, FieldOfView, Size};
+use clap::Args;
 use std::path::{Path, PathBuf};
-use veduta::accumulate::Picture;
 use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Sampling, Shortcoming};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::DVec3;
-use veduta_io::tone::{self, Exposure, Tone};
-use veduta_io::{PictureFormat, PictureOptions, PngDepth, write_picture};
 
 /// Make a picture of a model
 ///
 /// Without a camera the whole model is shown, three quarters from the front right and a little from
 /// above. World axes: Z is up; a model's front is -Y.
+///
+/// Pictures for a display (.png, .jpg, .webp, .tif of 8 or 16 bits) are exposed and toned unless told;
+/// those for further work (.exr, .pfm, .npy, .tif of floats) are linear and left as they are.
 #[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Render {
     /// The model: .glb, .gltf or .obj
     model: PathBuf,
-    /// The picture: .png, .exr or .npy
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
     /// Size in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x960")]
     size: Size,
@@ -34,15 +35,31 @@ pub struct Render {
     strict: bool,
 
     #[command(flatten)]
+    output: Output,
+    #[command(flatten)]
     view: View,
     #[command(flatten)]
     look: Look,
 }
 
+const EXAMPLES: &str = "\
+Examples:
+  A first look, in the terminal:
+      veduta render town.obj --preview=blocks
+  A picture from a point of view, on a colour:
+      veduta render town.obj -o town.png --eye 40,-60,25 --look-at 0,0,5 --background '#cfdde6'
+  A plan, north upwards, of 16 bits a channel:
+      veduta render town.obj -o plan.tif --depth 16 --parallel 120 --eye 0,0,100 --look-at 0,0,0
+  Linear light for compositing, in tiles of half floats:
+      veduta render town.obj -o town.exr --depth half --tile 64
+  Onto a photograph, through a pipe:
+      veduta render town.obj --size 320x240 --background sky.jpg -o - | cat > town.png
+";
+
 /// Where the picture is taken from.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "View")]
-struct View {
+pub(super) struct View {
     /// A camera of the model by its name; auto shows the whole model
     #[arg(
         long,
@@ -74,51 +91,12 @@ struct View {
     up_axis: Option<UpAxisArgument>,
 }
 
-/// How light becomes colour.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Look")]
-struct Look {
-    /// Show the colours of materials as they are, without light
-    #[arg(long)]
-    unlit: bool,
-    /// none, or a colour such as #8ab4d8
-    #[arg(long, value_name = "COLOUR", default_value = "none")]
-    background: Background,
-    /// auto, or doublings of light; auto for lit .png by default, else 0
-    #[arg(long, value_name = "EV", value_parser = values::exposure, allow_hyphen_values = true)]
-    exposure: Option<Exposure>,
-    /// How highlights are rolled off; filmic for lit .png by default, else none
-    #[arg(long, value_name = "CURVE")]
-    tone: Option<ToneArgument>,
-    /// Bits of a channel of a .png
-    #[arg(long, value_name = "BITS", default_value = "8")]
-    depth: DepthArgument,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ToneArgument {
-    /// Cut off what is brighter than white
-    None,
-    /// Leave middle tones, roll off highlights
-    Filmic,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum DepthArgument {
-    /// 8 bits
-    #[value(name = "8")]
-    Eight,
-    /// 16 bits
-    #[value(name = "16")]
-    Sixteen,
-}
-
 impl Render {
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let format = PictureFormat::of(&self.output)?;
-        refuse_output_nowhere(&self.output)?;
+        let target = self.output.target(json)?;
         let scene = load(&self.model, self.view.up_axis, self.strict, talk)?;
         let camera = self.view.camera(&self.model, &scene, self.size)?;
+        let development = self.look.development(&scene, self.strict, talk)?;
 
         let settings = RenderSettings {
             width: self.size.width,
@@ -133,25 +111,47 @@ impl Render {
         talk.begin("finding visibility");
         let map = pipeline::find_visibility(&scene, &camera);
         self.tell_shortcomings(&scene, &pipeline::shortcomings(&scene, &map), talk)?;
-        talk.begin("shading");
-        let mut picture = pipeline::render_map(&scene, &map, &settings);
-        talk.begin("developing");
-        let ev = self.look.develop(&mut picture, &scene, format);
-        talk.begin("writing");
-        let depth = match self.look.depth {
-            DepthArgument::Eight => PngDepth::Eight,
-            DepthArgument::Sixteen => PngDepth::Sixteen,
-        };
-        write_picture(&self.output, &picture, &PictureOptions { depth })?;
+        let mut ev = None;
+        if let Some(target) = &target {
+            talk.begin("shading");
+            let mut picture = pipeline::render_map(&scene, &map, &settings);
+            talk.begin("developing");
+            ev = Some(development.develop(&mut picture, !target.linear));
+            talk.begin("writing");
+            target.write(&picture)?;
+        }
+        if let Some(screen) = self.output.preview.and_then(Screen::of) {
+            talk.begin("previewing");
+            // From the map, not from the picture: it has no resolution, so that a small picture is as
+            // exact as a large one and costs less than scaling that.
+            let [width, height] = screen.size_of(self.size.width, self.size.height);
+            let settings = RenderSettings {
+                width,
+                height,
+                ..settings
+            };
+            let mut picture = pipeline::render_map(&scene, &map, &settings);
+            match (ev, &target) {
+                (Some(ev), Some(target)) if !target.linear => {
+                    development.develop_at(&mut picture, ev, true);
+                }
+                _ => {
+                    ev = Some(development.develop(&mut picture, true));
+                }
+            }
+            talk.end();
+            print_bytes(&screen.show(&picture))?;
+        }
         talk.end();
+        let ev = ev.unwrap_or(0.0);
         talk.detail(format_args!(
             "{} faces, exposure {ev:.2} EV",
             scene.face_count()
         ));
 
-        if json {
+        if let (true, Some(target)) = (json, &target) {
             let told = serde_json::json!({
-                "output": self.output.to_string_lossy(),
+                "output": target.name(),
                 "size": [self.size.width, self.size.height],
                 "faces": scene.face_count(),
                 "exposure": ev,
@@ -191,32 +191,17 @@ impl Render {
     }
 }
 
-/// Fails before the work rather than after it when the output has no folder to stand in.
-fn refuse_output_nowhere(output: &Path) -> Result<(), Failure> {
-    let folder = output
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    let found = folder.map_or(Ok(()), |folder| match std::fs::metadata(folder) {
-        Ok(metadata) if metadata.is_dir() => Ok(()),
-        Ok(_) => Err("it is not a folder".to_owned()),
-        Err(error) => Err(error.to_string()),
-    });
-    found.map_err(|reason| {
-        let folder = folder.unwrap_or(output).display();
-        let message = format!(
-            "{}: cannot be written into {folder}: {reason}",
-            output.display()
-        );
-        Failure::new(Code::InputOutput, message)
-    })
-}
-
 /// Depth of the near plane where none is given, as a share of the scene's size.
 const NEAR_SHARE: f64 = 1e-5;
 
 impl View {
     /// The camera that the arguments ask for.
-    fn camera(&self, model: &Path, scene: &Scene, size: Size) -> Result<Camera, Failure> {
+    pub(super) fn camera(
+        &self,
+        model: &Path,
+        scene: &Scene,
+        size: Size,
+    ) -> Result<Camera, Failure> {
         let aspect = f64::from(size.width) / f64::from(size.height);
         let Some(bounds) = Bounds::of_scene(scene) else {
             let message = format!(
@@ -325,35 +310,5 @@ impl View {
             }
         }
         Ok(camera)
-    }
-}
-
-impl Look {
-    /// Applies exposure, tone and background; tells the exposure in EV.
-    ///
-    /// Only a lit picture for a display is exposed and toned unasked: linear formats are for further
-    /// work, and unlit colours are to come through as they are.
-    fn develop(&self, picture: &mut Picture, scene: &Scene, format: PictureFormat) -> f32 {
-        let unlit = self.unlit || scene.materials.iter().all(|material| material.unlit);
-        let for_display = format == PictureFormat::Png && !unlit;
-        let (exposure, tone) = if for_display {
-            (Exposure::Auto, Tone::Filmic)
-        } else {
-            (Exposure::Ev(0.0), Tone::None)
-        };
-        let tone = match self.tone {
-            Some(ToneArgument::None) => Tone::None,
-            Some(ToneArgument::Filmic) => Tone::Filmic,
-            None => tone,
-        };
-        let ev = tone::exposure_of(picture, self.exposure.unwrap_or(exposure));
-        if ev != 0.0 {
-            tone::expose(picture, ev);
-        }
-        tone::apply_tone(picture, tone);
-        if let Background::Color(color) = self.background {
-            tone::lay_on(picture, color);
-        }
-        ev
     }
 }
