@@ -195,8 +195,7 @@ impl Exchange {
 /// See the module's page.
 fn clip_from_eye(camera: &Camera, positions: &[DVec3]) -> DMat4 {
     let scale = 2.0 * camera.image_scale();
-    let x = DVec4::new(scale.x, 0.0, 0.0, 0.0);
-    let y = DVec4::new(0.0, scale.y, 0.0, 0.0);
+    let ahead = 2.0 * camera.principal_point() - 1.0;
     let (z, w) = match camera.projection {
         Projection::Perspective { .. } => (DVec4::new(0.0, 0.0, 0.0, camera.near), DVec4::Z),
         Projection::Parallel { .. } => {
@@ -207,6 +206,8 @@ fn clip_from_eye(camera: &Camera, positions: &[DVec3]) -> DMat4 {
             (DVec4::new(0.0, 0.0, -slope, farthest * slope), DVec4::W)
         }
     };
+    let x = DVec4::new(scale.x, 0.0, 0.0, 0.0) + ahead.x * w;
+    let y = DVec4::new(0.0, scale.y, 0.0, 0.0) + ahead.y * w;
     DMat4::from_cols(x, y, z, w).transpose()
 }
 

@@ -30,6 +30,12 @@ pub struct Camera {
     pub projection: Projection,
     /// Depth of the near plane in metres. Positive for perspective; any number for parallel.
     pub near: f64,
+    /// How far the frame is moved over the plane of projection, away from the line of sight: to the
+    /// right in widths of the frame, upwards in heights of it (a lens shift; a rising front).
+    ///
+    /// The eye does not turn, so that uprights stay upright: with a shift of (0, 0.25) a quarter of
+    /// the frame is seen more above, and as much less below.
+    pub shift: DVec2,
 }
 
 impl Camera {
@@ -60,7 +66,26 @@ impl Camera {
             eye_from_world,
             projection,
             near,
+            shift: DVec2::ZERO,
         })
+    }
+
+    /// The camera with a frame of another shape: its height is kept, and the width grows or shrinks on
+    /// both sides of the frame's middle.
+    pub fn with_aspect(mut self, aspect: f64) -> Self {
+        self.shift.x *= self.aspect() / aspect;
+        match &mut self.projection {
+            Projection::Perspective { aspect: of, .. }
+            | Projection::Parallel { aspect: of, .. } => *of = aspect,
+        }
+        self
+    }
+
+    /// The image point straight ahead: the middle of the frame, unless it is shifted.
+    #[inline]
+    pub fn principal_point(&self) -> DVec2 {
+        // The frame goes one way, what is seen in it the other; y points down.
+        DVec2::new(0.5 - self.shift.x, 0.5 + self.shift.y)
     }
 
     /// Width over height of the frame.
@@ -91,7 +116,7 @@ impl Camera {
             Projection::Perspective { .. } => DVec2::new(point.x / point.z, point.y / point.z),
             Projection::Parallel { .. } => DVec2::new(point.x, point.y),
         };
-        flat * scale + 0.5
+        flat * scale + self.principal_point()
     }
 
     /// Origin and direction, in eye space, of the line of sight through an image point.
@@ -100,7 +125,7 @@ impl Camera {
     /// parallel projection it is `origin - q * direction`.
     #[inline]
     pub fn eye_ray(&self, image: DVec2) -> (DVec3, DVec3) {
-        let flat = (image - 0.5) / self.image_scale();
+        let flat = (image - self.principal_point()) / self.image_scale();
         match self.projection {
             Projection::Perspective { .. } => (DVec3::ZERO, flat.extend(1.0)),
             Projection::Parallel { .. } => (flat.extend(0.0), DVec3::Z),
@@ -122,20 +147,18 @@ impl Camera {
     pub fn nearness_of_plane(&self, point: DVec3, normal: DVec3) -> Option<Affine> {
         let scale = self.image_scale();
         let (nx, ny) = (normal.x / scale.x, normal.y / scale.y);
+        let ahead = self.principal_point();
+        let along = nx * ahead.x + ny * ahead.y;
         let distance = normal.dot(point);
         let plane = match self.projection {
-            // normal . (ray / q) = distance, ray = ((x - 1/2) / sx, (y - 1/2) / sy, 1).
-            Projection::Perspective { .. } => Affine::new(
-                nx / distance,
-                ny / distance,
-                (normal.z - 0.5 * (nx + ny)) / distance,
-            ),
-            // nx (x - 1/2) + ny (y - 1/2) + nz z = distance, and nearness is -z.
-            Projection::Parallel { .. } => Affine::new(
-                nx / normal.z,
-                ny / normal.z,
-                -(distance + 0.5 * (nx + ny)) / normal.z,
-            ),
+            // normal . (ray / q) = distance, ray = ((x - px) / sx, (y - py) / sy, 1).
+            Projection::Perspective { .. } => {
+                Affine::new(nx / distance, ny / distance, (normal.z - along) / distance)
+            }
+            // nx (x - px) + ny (y - py) + nz z = distance, and nearness is -z.
+            Projection::Parallel { .. } => {
+                Affine::new(nx / normal.z, ny / normal.z, -(distance + along) / normal.z)
+            }
         };
         (plane.a.is_finite() && plane.b.is_finite() && plane.c.is_finite()).then_some(plane)
     }
@@ -180,9 +203,25 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_shifted_up_and_right_shows_things_lower_and_further_left() {
+        for projection in BOTH {
+            let mut camera = camera(projection);
+            camera.shift = DVec2::new(0.25, 0.125);
+            let ahead = camera.eye_from_world.transform_point3(DVec3::ZERO);
+            let expected = DVec2::new(0.25, 0.625);
+            assert!((camera.image_from_eye(ahead) - expected).length() < 1e-12);
+            // Another shape of the frame keeps its middle where it is.
+            let middle = |camera: &Camera| camera.eye_from_image(DVec2::splat(0.5), -1.0);
+            let wide = camera.with_aspect(3.0);
+            assert!((middle(&wide) - middle(&camera)).length() < 1e-12);
+        }
+    }
+
+    #[test]
     fn a_plane_has_the_nearness_of_its_points() {
         for projection in BOTH {
-            let camera = camera(projection);
+            let mut camera = camera(projection);
+            camera.shift = DVec2::new(-0.3, 0.7);
             let points = [
                 DVec3::new(0.3, 0.2, 4.0),
                 DVec3::new(-0.5, 0.1, 5.0),
