@@ -22,6 +22,7 @@ pub use read::{
 pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
 pub use scale::scaled;
 pub use write::{
-    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteError,
-    WriteProblem, remove_unfinished, stream_picture, write_picture, write_picture_as,
+    ExrCompression, MODEL_SUFFIXES, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples,
+    WriteError, WriteProblem, remove_unfinished, stream_picture, write_model, write_picture,
+    write_picture_as,
 };

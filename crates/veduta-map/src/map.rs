@@ -71,6 +71,21 @@ impl VisibilityMap {
         }
     }
 
+    /// The opaque fragment that is seen at a point of the image plane: an index into
+    /// [`VisibilityMap::opaque`]. `None` for the background.
+    ///
+    /// On the border between fragments it is the first of them. Takes time in proportion to the number
+    /// of fragments.
+    pub fn opaque_at(&self, image: DVec2) -> Option<usize> {
+        self.opaque.iter().position(|fragment| {
+            let polygon = self.polygon(fragment);
+            (0..polygon.len()).all(|k| {
+                let (from, to) = (polygon[k], polygon[(k + 1) % polygon.len()]);
+                veduta_geometry::cross(to - from, image - from) >= 0.0
+            })
+        })
+    }
+
     /// Checks the invariants; the first that fails is returned.
     ///
     /// # Errors

@@ -88,10 +88,13 @@ pub(super) struct View {
     near: Option<f64>,
     /// The axis of the file that points upwards; the format's habit by default
     #[arg(long, value_name = "AXIS")]
-    up_axis: Option<UpAxisArgument>,
+    pub(super) up_axis: Option<UpAxisArgument>,
 }
 
 impl Render {
+    /// Width and height in pixels where none are given.
+    pub const USUAL_SIZE: [u32; 2] = [1280, 960];
+
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         let target = self.output.target(json)?;
         let scene = load(&self.model, self.view.up_axis, self.strict, talk)?;
@@ -195,6 +198,15 @@ impl Render {
 const NEAR_SHARE: f64 = 1e-5;
 
 impl View {
+    /// Whether any of the options is given.
+    pub(super) fn is_asked_for(&self) -> bool {
+        self.camera != "auto"
+            || self.eye.is_some()
+            || self.fov.is_some()
+            || self.parallel.is_some()
+            || self.near.is_some()
+    }
+
     /// The camera that the arguments ask for.
     pub(super) fn camera(
         &self,

@@ -1,4 +1,4 @@
-//! Pictures -> files that other programs read.
+//! Pictures, and plain scenes -> files that other programs read.
 //!
 //! The suffix chooses the writer. A file is made without a name, or under a temporary one beside its
 //! place, and then put there ([`partial_file`]), so that readers see the old file or the new one, and
@@ -14,6 +14,7 @@ mod coded;
 mod exr;
 #[cfg(feature = "jpeg")]
 mod jpeg;
+mod model;
 mod npy;
 mod partial_file;
 mod pfm;
@@ -24,6 +25,7 @@ mod tiff;
 #[cfg(feature = "webp")]
 mod webp;
 
+pub use model::{MODEL_SUFFIXES, write_model};
 pub use partial_file::remove_unfinished;
 
 use partial_file::PartialFile;
@@ -229,7 +231,7 @@ pub enum ExrCompression {
     Piz,
 }
 
-/// Why a picture could not be written.
+/// Why a picture or a scene could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", file.display())]
 pub struct WriteError {
@@ -239,13 +241,16 @@ pub struct WriteError {
     pub problem: WriteProblem,
 }
 
-/// What went wrong when a picture was written.
+/// What went wrong when a picture or a scene was written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteProblem {
     /// The suffix names no format that is written.
     #[error("has no suffix of a picture; pictures are written as {0}")]
     UnknownSuffix(String),
+    /// The suffix names no format of models that is written.
+    #[error("has no suffix of a model; models are written as {0}")]
+    UnknownModelSuffix(String),
     /// The format has no such samples.
     #[error("a picture of that format is stored as {possible}, not as {asked}")]
     NoSuchSamples {
@@ -260,6 +265,9 @@ pub enum WriteProblem {
     /// The format cannot hold the picture.
     #[error("cannot hold the picture: {0}")]
     Encode(String),
+    /// The scene has what is not written.
+    #[error("cannot hold the scene: {0}")]
+    Model(String),
 }
 
 /// Writes a picture; an old file of that name is replaced. What is no file (a device, a named pipe)
