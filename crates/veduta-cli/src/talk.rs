@@ -162,6 +162,12 @@ pub fn grouped(number: usize) -> String {
     grouped
 }
 
+/// A number of things of that name: `1 face`, `2,000 faces`.
+pub fn counted(number: usize, name: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{} {name}{plural}", grouped(number))
+}
+
 /// A name from a file, for a terminal: control characters, which could move its cursor or worse, are
 /// shown as escapes.
 pub fn plain(name: &str) -> String {

@@ -46,14 +46,14 @@ const EXAMPLES: &str = "\
 Examples:
   A first look, in the terminal:
       veduta render town.obj --preview=blocks
-  A picture from a point of view, on a colour:
-      veduta render town.obj -o town.png --eye 40,-60,25 --look-at 0,0,5 --background '#cfdde6'
-  A plan, north upwards, of 16 bits a channel:
-      veduta render town.obj -o plan.tif --depth 16 --parallel 120 --eye 0,0,100 --look-at 0,0,0
+  From a point of view, on a colour:
+      veduta render town.obj -o a.png --eye 40,-60,25 --background '#cfdde6'
+  A plan, north upwards, with 16 bits a channel:
+      veduta render town.obj -o plan.tif --depth 16 --eye 0,0,100 --parallel 120
   Linear light for compositing, in tiles of half floats:
       veduta render town.obj -o town.exr --depth half --tile 64
   Onto a photograph, through a pipe:
-      veduta render town.obj --size 320x240 --background sky.jpg -o - | cat > town.png
+      veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
 
 /// Where the picture is taken from.

@@ -4,7 +4,7 @@ mod topology;
 
 use super::{UpAxisArgument, is_picture};
 use crate::exit::{Ending, Failure};
-use crate::talk::{Talk, grouped, plain, print};
+use crate::talk::{Talk, counted, plain, print};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -161,10 +161,10 @@ fn model(scene: &Scene) -> Held {
         }
     }
     let summary = format!(
-        "{} faces in {} objects, {} materials",
-        grouped(scene.face_count()),
-        grouped(scene.objects.len()),
-        scene.materials.len()
+        "{} in {}, {}",
+        counted(scene.face_count(), "face"),
+        counted(scene.objects.len(), "object"),
+        counted(scene.materials.len(), "material")
     );
     Held::Model {
         summary,
@@ -219,7 +219,7 @@ impl Report {
         let file = plain(&self.file.to_string_lossy());
         // The messages begin with the file's name, and the place in it.
         if let Some(error) = &self.error {
-            writeln!(text, "{}\n  error: {}", file, plain(error))?;
+            writeln!(text, "error: {}", plain(error))?;
         }
         match &self.held {
             None => {}

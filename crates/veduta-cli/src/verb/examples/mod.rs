@@ -34,9 +34,10 @@ Examples:
   The scene of the pictures in the README, in the terminal:
       veduta examples river && veduta render river.glb --preview=blocks
   Wires thinner than a pixel, through the camera that they are made for:
-      veduta examples mesh5 && veduta render mesh5.glb --camera view --size 512x512 -o mesh5.png
+      veduta examples mesh5
+      veduta render mesh5.glb --camera view --size 512x512 -o mesh5.png
   With every digit of its coordinates:
-      veduta examples pierce -o pierce.obj && veduta render pierce.obj --unlit -o pierce.png
+      veduta examples pierce -o pierce.obj
 ";
 
 /// The example with which to begin.

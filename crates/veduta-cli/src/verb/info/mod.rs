@@ -33,7 +33,7 @@ pub struct Info {
     strict: bool,
     /// Tell what is seen at a pixel, counted from 0 at the top left; 12,7 means the middle of that
     /// pixel, 12.5,7.0 the exact point
-    #[arg(long, value_name = "X,Y")]
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
     pick: Option<Spot>,
     /// Size in pixels of the picture that is picked from
     #[arg(long, value_name = "WxH", default_value = "1280x960")]
