@@ -139,3 +139,52 @@ impl VisibilityMap {
         Ok(sum)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ObjectId, Projection, Side};
+    use veduta_geometry::{Affine, DVec3};
+
+    #[test]
+    fn a_point_finds_the_fragment_that_it_lies_in() {
+        let lens = Projection::Parallel {
+            height: 1.0,
+            aspect: 1.0,
+        };
+        let camera = Camera::looking(DVec3::ZERO, DVec3::Y, DVec3::Z, lens, 0.0);
+        let mut faces = Faces::new();
+        let plane = faces.push_plane(Affine::new(0.0, 0.0, 1.0));
+        let square = [[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75]].map(DVec2::from);
+        let [below, right] = [DVec2::new(0.0, 0.5), DVec2::new(0.25, 0.0)];
+        let mut push = |by: DVec2| {
+            let outline = square.map(|corner| corner + by);
+            faces
+                .push(&outline, plane, ObjectId(0), 0)
+                .expect("has an area")
+        };
+        let (first, second) = (push(DVec2::ZERO), push(right));
+        let mut opaque = Fragments::new();
+        opaque.push_whole(first);
+        // What the first leaves of the second.
+        let rest = [square[1], square[1] + right, square[2] + right, square[2]];
+        let side = Side::of_outline(first, 1);
+        opaque.push_cut(second, rest.map(|vertex| (vertex, side)).into_iter());
+        let map = VisibilityMap {
+            camera: camera.expect("a sound camera"),
+            faces,
+            opaque,
+            veils: Fragments::new(),
+        };
+        map.check().expect("sound");
+        let middle = DVec2::splat(0.5);
+        assert_eq!(map.opaque_at(middle), Some(0));
+        assert_eq!(map.opaque_at(DVec2::new(0.875, 0.5)), Some(1));
+        assert_eq!(
+            map.opaque_at(square[1]),
+            Some(0),
+            "the first of two on the border"
+        );
+        assert_eq!(map.opaque_at(middle + below), None);
+    }
+}

@@ -2,6 +2,7 @@
 
 use crate::exit::{Code, Failure};
 use crate::preview::Style;
+use crate::values::Size;
 use clap::{Args, ValueEnum};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -98,7 +99,7 @@ enum Place {
 
 impl Output {
     /// The place asked for, if one is.
-    pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
+    pub fn target(&self, size: Size, json: bool) -> Result<Option<Target>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);
         };
@@ -133,6 +134,14 @@ impl Output {
         let for_exr = self.compression.is_some() || self.tile.is_some();
         if for_exr && format != PictureFormat::Exr {
             return usage("--compression and --tile are for .exr".into());
+        }
+        if let Some(most) = format.most_side()
+            && size.width.max(size.height) > most
+        {
+            return usage(format!(
+                "{}: a picture of that format has at most {most} pixels a side; write .png",
+                output.display()
+            ));
         }
         let options = self.options();
         let samples = options.samples_in(format);

@@ -96,7 +96,7 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let target = self.output.target(json)?;
+        let target = self.output.target(self.size, json)?;
         let scene = load(&self.model, self.view.up_axis, self.strict, talk)?;
         let camera = self.view.camera(&self.model, &scene, self.size)?;
         let development = self.look.development(&scene, self.strict, talk)?;

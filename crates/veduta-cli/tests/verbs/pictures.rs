@@ -134,6 +134,7 @@ const SENSELESS: &[(&str, &str)] = &[
     ),
     ("-o a.exr --tile 0", "--tile"),
     ("-o a.png --format gif", "expected one of png, jpg"),
+    ("-o a.webp --size 16385x1", "at most 16384 pixels a side"),
     ("-o - --json", "both write to stdout"),
     ("-o - --preview", "both write to stdout"),
     ("--preview --json", "cannot be used with"),

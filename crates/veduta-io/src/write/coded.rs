@@ -4,18 +4,21 @@ use crate::tone::srgb_from_linear;
 use rayon::prelude::*;
 
 /// Straight sRGB with opacity, 8 bits a channel.
+#[cfg(any(feature = "png", feature = "tiff", feature = "webp"))]
 pub fn rgba8(pixels: &[[f32; 4]]) -> Vec<u8> {
     let coded = |&pixel: &[f32; 4]| straight_srgb(pixel).map(|value| round(value, 255.0) as u8);
     pixels.par_iter().flat_map_iter(coded).collect()
 }
 
 /// Straight sRGB with opacity, 16 bits a channel.
+#[cfg(any(feature = "png", feature = "tiff"))]
 pub fn rgba16(pixels: &[[f32; 4]]) -> Vec<u16> {
     let coded = |&pixel: &[f32; 4]| straight_srgb(pixel).map(|value| round(value, 65_535.0) as u16);
     pixels.par_iter().flat_map_iter(coded).collect()
 }
 
 /// sRGB on white, 8 bits a channel.
+#[cfg(feature = "jpeg")]
 pub fn rgb8_on_white(pixels: &[[f32; 4]]) -> Vec<u8> {
     let coded = |&[r, g, b, alpha]: &[f32; 4]| {
         let white = (1.0 - alpha).max(0.0);
@@ -25,6 +28,7 @@ pub fn rgb8_on_white(pixels: &[[f32; 4]]) -> Vec<u8> {
 }
 
 /// Premultiplied linear RGBA -> straight sRGB with opacity, all from 0 to 1.
+#[cfg(any(feature = "png", feature = "tiff", feature = "webp"))]
 fn straight_srgb([r, g, b, alpha]: [f32; 4]) -> [f32; 4] {
     if alpha <= 0.0 {
         return [0.0; 4];
@@ -38,7 +42,7 @@ fn round(value: f32, most: f32) -> f32 {
     (value * most).round()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "png", feature = "jpeg"))]
 mod tests {
     use super::*;
 

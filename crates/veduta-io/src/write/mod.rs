@@ -114,6 +114,17 @@ impl PictureFormat {
             })
     }
 
+    /// The widest and highest picture of the format, in pixels; `None` for one without such limit.
+    pub fn most_side(self) -> Option<u32> {
+        match self {
+            #[cfg(feature = "jpeg")]
+            Self::Jpeg => Some(65_535),
+            #[cfg(feature = "webp")]
+            Self::WebP => Some(16_384),
+            _ => None,
+        }
+    }
+
     /// The samples that the format can hold; the first is its habit.
     pub fn samples(self) -> &'static [Samples] {
         match self {
@@ -337,6 +348,16 @@ fn encode(
     options: &PictureOptions,
 ) -> Result<(), WriteProblem> {
     let samples = options.samples_in(format)?;
+    #[cfg(not(any(feature = "png", feature = "tiff", feature = "exr")))]
+    let _ = samples;
+    let (width, height) = (picture.width, picture.height);
+    if let Some(most) = format.most_side()
+        && width.max(height) > most
+    {
+        return Err(WriteProblem::Encode(format!(
+            "its format ends at {most} pixels a side, and it has {width} x {height}; write .png"
+        )));
+    }
     match format {
         #[cfg(feature = "png")]
         PictureFormat::Png => png::write(writer, picture, samples),
