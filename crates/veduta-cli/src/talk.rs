@@ -63,6 +63,24 @@ impl Talk {
         self.step = Some((step, Instant::now()));
     }
 
+    /// Says that `done` of `count` parts of the current step are done.
+    pub fn part(&mut self, done: usize, count: usize) {
+        let Some((step, _)) = &self.step else {
+            return;
+        };
+        match self.style {
+            ProgressStyle::Bar => {
+                let percent = 100 * done / count.max(1);
+                say(format_args!("\r\x1b[2Kveduta: {step} … {percent} %"));
+            }
+            ProgressStyle::Json => {
+                let line = serde_json::json!({ "step": step, "done": false, "part": done, "parts": count });
+                say(format_args!("{line}\n"));
+            }
+            ProgressStyle::Auto | ProgressStyle::None => {}
+        }
+    }
+
     /// Says that the current step is done.
     pub fn end(&mut self) {
         let Some((step, start)) = self.step.take() else {

@@ -253,9 +253,9 @@ const FAILURES: &[(&str, i32, &str)] = &[
         "scenes are read from .glb, .gltf, .obj",
     ),
     (
-        "render draco.gltf -o a.png",
+        "render basis.gltf -o a.png",
         5,
-        "the extension KHR_draco_mesh_compression is required",
+        "the extension KHR_texture_basisu is required",
     ),
     ("render gone.obj -o a.png", 6, "gone.obj: cannot be read: "),
     (
@@ -280,8 +280,8 @@ fn failures_say_why_with_their_exit_code_and_leave_no_file() {
         gltf(r#""buffers":[{"uri":"lost.bin","byteLength":4}]"#),
     );
     folder.write(
-        "draco.gltf",
-        gltf(r#""extensionsRequired":["KHR_draco_mesh_compression"]"#),
+        "basis.gltf",
+        gltf(r#""extensionsRequired":["KHR_texture_basisu"]"#),
     );
     folder.write("wrong.obj", "v 0 0 0\nf 1 2 3\n");
     folder.write("cut.glb", "glTF\x02");

@@ -8,6 +8,7 @@
 //! another; `pipeline` alone knows their order.
 
 pub mod accumulate;
+mod buckets;
 pub mod dice;
 pub mod pipeline;
 pub mod scene;

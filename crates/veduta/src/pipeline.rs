@@ -1,14 +1,15 @@
 //! The order of the stages: the only file that knows it.
 
 use crate::accumulate::{self, Picture};
-use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid};
+use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};
 use crate::scene::{AlphaMode, Scene};
 use crate::shade::light::Daylight;
-use crate::shade::{Radiance, Surfaces};
-use crate::visibility::{self, Seen, speculative};
+use crate::shade::{Radiance, Surfaces, Textures};
+use crate::visibility::multiscan::{self, Spans};
+use crate::visibility::{self, Seen, Strips, speculative};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use veduta_map::{Camera, MaterialId, VisibilityMap};
+use veduta_map::{Camera, FaceId, Faces, MaterialId, VisibilityMap};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,13 +56,46 @@ pub enum Shortcoming {
     VeilsLeftOut(usize),
 }
 
+/// A picture, and what it does not show as it should.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// The picture.
+    pub picture: Picture,
+    /// In ascending order.
+    pub shortcomings: Vec<Shortcoming>,
+}
+
+/// What [`render`] is about to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Step {
+    /// Faces are put into the image plane.
+    Projecting,
+    /// What is seen is found.
+    FindingVisibility,
+    /// What is seen is made to pixels.
+    Shading,
+    /// A strip of a picture with more faces than pixels is found and made to pixels.
+    Strip {
+        /// Strips done before.
+        index: usize,
+        /// All strips.
+        count: usize,
+    },
+}
+
 /// Finds what `camera` sees of `scene`.
 ///
 /// The map has no resolution: pictures of any size are made of it.
 pub fn find_visibility(scene: &Scene, camera: &Camera) -> VisibilityMap {
-    let faces = visibility::project(scene, camera);
+    map_of(camera, visibility::project(scene, camera), [0.0, 1.0])
+}
+
+/// The map of faces that all lie in a strip of the frame.
+fn map_of(camera: &Camera, faces: Faces, strip: [f64; 2]) -> VisibilityMap {
     let settings = speculative::Settings {
         aspect: camera.aspect(),
+        strip,
         ..Default::default()
     };
     let Seen { opaque, veils } = speculative::find(&faces, &settings);
@@ -73,12 +107,39 @@ pub fn find_visibility(scene: &Scene, camera: &Camera) -> VisibilityMap {
     }
 }
 
-/// Makes the picture that `camera` takes of `scene`.
+/// Makes the picture that `camera` takes of `scene`. `begin` is told of each step.
+///
+/// With more faces than pixels no map is made: strips of the picture are found one after the other.
+/// Whether or not changes nothing that can be seen: areas are exact either way.
 ///
 /// # Panics
 /// If the size is 0, or the picture is too large for the machine's memory.
-pub fn render(scene: &Scene, camera: &Camera, settings: &RenderSettings) -> Picture {
-    render_map(scene, &find_visibility(scene, camera), settings)
+pub fn render(
+    scene: &Scene,
+    camera: &Camera,
+    settings: &RenderSettings,
+    mut begin: impl FnMut(Step),
+) -> Rendered {
+    let grid = PixelGrid::of_frame(settings.width, settings.height);
+    begin(Step::Projecting);
+    let faces = visibility::project(scene, camera);
+    if let Sampling::Multiscan(n) = settings.sampling {
+        begin(Step::FindingVisibility);
+        let spans = multiscan::find_spans(&faces, grid.width, grid.height, n);
+        begin(Step::Shading);
+        return render_spans(scene, camera, &faces, &spans, settings.unlit);
+    }
+    if faces.len() > grid.pixel_count() {
+        let strips = faces.len().div_ceil(FACES_PER_STRIP);
+        return render_strips(scene, camera, &faces, strips, settings, begin);
+    }
+    begin(Step::FindingVisibility);
+    let map = map_of(camera, faces, [0.0, 1.0]);
+    begin(Step::Shading);
+    Rendered {
+        picture: render_window(scene, &map, &grid, settings.unlit),
+        shortcomings: shortcomings(scene, &map),
+    }
 }
 
 /// Makes the picture of a map of `scene`, which must be the scene that the map was made of.
@@ -99,56 +160,179 @@ pub fn render_map(scene: &Scene, map: &VisibilityMap, settings: &RenderSettings)
 /// # Panics
 /// If the picture is too large for the machine's memory.
 pub fn render_window(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Picture {
-    let surfaces = Surfaces::new(scene, map, Daylight::default(), unlit);
-    let bands = Bands::new(map, *grid);
-    let mut picture = Picture {
+    let textures = Textures::new(scene, &materials_seen(scene, map));
+    let mut pixels = vec![[0.0; 4]; grid.pixel_count()];
+    render_pixels(scene, &textures, map, grid, unlit, &mut pixels);
+    Picture {
         width: grid.width,
         height: grid.height,
-        pixels: vec![[0.0; 4]; grid.pixel_count()],
-    };
+        pixels,
+    }
+}
+
+/// Makes the pixels of `grid`, all of which are overwritten.
+fn render_pixels(
+    scene: &Scene,
+    textures: &Textures,
+    map: &VisibilityMap,
+    grid: &PixelGrid,
+    unlit: bool,
+    pixels: &mut [[f32; 4]],
+) {
+    let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+    let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
+    let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
+    let bands = Bands::new(map, *grid);
     let band_pixels = grid.width as usize * BAND_ROWS as usize;
-    picture
-        .pixels
+    pixels
         .par_chunks_mut(band_pixels)
         .enumerate()
         .for_each_init(BandBuffers::default, |buffers, (band, pixels)| {
-            let BandBuffers {
-                dicer,
-                parts,
-                radiance,
-                sums,
-            } = buffers;
             let varies = |fragment| surfaces.varies(fragment);
-            dice::dice(map, &bands, band, varies, dicer, parts);
-            surfaces.shade(parts, grid, bands.rows(band).start, radiance);
-            accumulate::box_filter(parts, radiance, sums, pixels);
+            dice::dice(
+                map,
+                &bands,
+                band,
+                varies,
+                &mut buffers.dicer,
+                &mut buffers.parts,
+            );
+            buffers.finish(&surfaces, grid, bands.rows(band).start, pixels);
         });
-    picture
+}
+
+/// Makes a picture of what multiscan found.
+fn render_spans(
+    scene: &Scene,
+    camera: &Camera,
+    faces: &Faces,
+    spans: &Spans,
+    unlit: bool,
+) -> Rendered {
+    let shown = spans.faces();
+    let materials = shown.iter().map(|&face| material_of(scene, faces, face));
+    let materials: BTreeSet<MaterialId> = materials.collect();
+    let textures = Textures::new(scene, &materials);
+    let light = Daylight::default();
+    let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
+    let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
+    let grid = PixelGrid::of_frame(spans.width(), spans.height());
+    let mut pixels = vec![[0.0; 4]; grid.pixel_count()];
+    let band_pixels = grid.width as usize * BAND_ROWS as usize;
+    pixels
+        .par_chunks_mut(band_pixels)
+        .enumerate()
+        .for_each_init(BandBuffers::default, |buffers, (band, pixels)| {
+            let first = band as u32 * BAND_ROWS;
+            let rows = first..(first + BAND_ROWS).min(grid.height);
+            let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
+            dice::dice_spans(spans, rows, fragment_of, dicer, parts);
+            buffers.finish(&surfaces, &grid, first, pixels);
+        });
+    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
+    Rendered {
+        picture: Picture {
+            width: grid.width,
+            height: grid.height,
+            pixels,
+        },
+        shortcomings: shortcomings_of(scene, materials, veils),
+    }
+}
+
+/// Faces of a strip, about, where there are more faces than pixels: enough to keep all cores at
+/// work, few enough to bound memory.
+const FACES_PER_STRIP: usize = 128 * 1024;
+
+/// Makes a picture in `strips` strips of its rows or fewer, without keeping a map.
+fn render_strips(
+    scene: &Scene,
+    camera: &Camera,
+    faces: &Faces,
+    strips: usize,
+    settings: &RenderSettings,
+    mut begin: impl FnMut(Step),
+) -> Rendered {
+    let frame = PixelGrid::of_frame(settings.width, settings.height);
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    let count = strips.clamp(1, height);
+    let rows: Vec<usize> = (0..=count).map(|strip| strip * height / count).collect();
+    let border = |&row: &usize| row as f64 / height as f64;
+    let strips = Strips::new(faces, rows.iter().map(border).collect());
+    let in_view = faces.ids().map(|face| material_of(scene, faces, face));
+    let textures = Textures::new(scene, &in_view.collect());
+
+    let mut pixels = vec![[0.0; 4]; width * height];
+    let mut seen = BTreeSet::new();
+    let mut veils = 0;
+    for strip in 0..count {
+        begin(Step::Strip {
+            index: strip,
+            count,
+        });
+        let map = map_of(camera, strips.cut(strip).faces, strips.extent(strip));
+        let [first, end] = [rows[strip], rows[strip + 1]];
+        let grid = frame.window(0.0, first as f64, frame.width, (end - first) as u32);
+        let pixels = &mut pixels[first * width..end * width];
+        render_pixels(scene, &textures, &map, &grid, settings.unlit, pixels);
+        seen.extend(materials_seen(scene, &map));
+        veils += map.veils.len();
+    }
+    Rendered {
+        picture: Picture {
+            width: settings.width,
+            height: settings.height,
+            pixels,
+        },
+        shortcomings: shortcomings_of(scene, seen, veils),
+    }
 }
 
 /// What a thread keeps from band to band.
 #[derive(Default)]
 struct BandBuffers {
     dicer: Dicer,
+    span_dicer: SpanDicer,
     parts: Parts,
     radiance: Radiance,
     sums: Vec<[f64; 4]>,
 }
 
+impl BandBuffers {
+    /// Shades the parts of a band that begins at `first_row`, and sums them up.
+    fn finish(
+        &mut self,
+        surfaces: &Surfaces,
+        grid: &PixelGrid,
+        first_row: u32,
+        pixels: &mut [[f32; 4]],
+    ) {
+        surfaces.shade(&self.parts, grid, first_row, &mut self.radiance);
+        accumulate::box_filter(&self.parts, &self.radiance, &mut self.sums, pixels);
+    }
+}
+
+fn material_of(scene: &Scene, faces: &Faces, face: FaceId) -> MaterialId {
+    let mesh = scene.mesh_of(faces.object(face));
+    mesh.material_of(faces.source(face))
+}
+
+fn materials_seen(scene: &Scene, map: &VisibilityMap) -> BTreeSet<MaterialId> {
+    (0..map.opaque.len())
+        .map(|fragment| material_of(scene, &map.faces, map.opaque.face(fragment)))
+        .collect()
+}
+
 /// What [`render_map`] does not show as it should, in ascending order.
 pub fn shortcomings(scene: &Scene, map: &VisibilityMap) -> Vec<Shortcoming> {
-    let seen: BTreeSet<MaterialId> = (0..map.opaque.len())
-        .map(|fragment| {
-            let face = map.opaque.face(fragment);
-            let mesh = scene.mesh_of(map.faces.object(face));
-            mesh.material_of(map.faces.source(face))
-        })
-        .collect();
+    shortcomings_of(scene, materials_seen(scene, map), map.veils.len())
+}
+
+fn shortcomings_of(scene: &Scene, seen: BTreeSet<MaterialId>, veils: usize) -> Vec<Shortcoming> {
     let drawn_opaque = seen
         .into_iter()
         .filter(|&id| scene.material(id).alpha_mode != AlphaMode::Opaque)
         .map(Shortcoming::DrawnOpaque);
-    let veils = map.veils.len();
     drawn_opaque
         .chain((veils > 0).then_some(Shortcoming::VeilsLeftOut(veils)))
         .collect()
@@ -159,7 +343,7 @@ mod tests {
     use super::*;
     use crate::scene::{Image, ImageId, Material, Mesh, MeshId, Object, TextureRef};
     use veduta_geometry::{DMat4, DVec2, DVec3, Vec2, Vec3};
-    use veduta_map::{Affine, Faces, Fragments, ObjectId, Projection};
+    use veduta_map::{Affine, Fragments, ObjectId, Projection};
 
     /// A scene of one mesh with one material.
     fn scene_of(mesh: Mesh, material: Material) -> Scene {
@@ -182,7 +366,7 @@ mod tests {
 
     /// The map of a scene whose faces hide nothing of one another and lie before the eye. What lies
     /// outside the frame is for the window to cut off.
-    fn map_of(scene: &Scene, camera: Camera) -> VisibilityMap {
+    fn flat_map_of(scene: &Scene, camera: Camera) -> VisibilityMap {
         let mut faces = Faces::new();
         let mut opaque = Fragments::new();
         let plane = faces.push_plane(Affine::new(0.0, 0.0, 1.0));
@@ -288,7 +472,7 @@ mod tests {
             ..Material::default()
         };
         let scene = scene_of(ground(5.0, 40), material);
-        let map = map_of(&scene, parallel(DVec3::new(0.1, -1.0, 4.0), 3.0, 1.5));
+        let map = flat_map_of(&scene, parallel(DVec3::new(0.1, -1.0, 4.0), 3.0, 1.5));
         let picture = render_map(&scene, &map, &unlit(96, 64));
         for pixel in &picture.pixels {
             for (value, expected) in pixel.iter().zip([1.0, 0.5, 0.25, 1.0]) {
@@ -305,7 +489,7 @@ mod tests {
             parallel(DVec3::new(1.0, -4.0, 1.5), 2.5, 1.5),
         ] {
             let (width, height) = (144_usize, 96_usize);
-            let map = map_of(&scene, camera);
+            let map = flat_map_of(&scene, camera);
             let picture = render_map(&scene, &map, &unlit(width as u32, height as u32));
 
             // What a ray meets, straight from the scene's description: light, dark or nothing.
@@ -400,7 +584,7 @@ mod tests {
     #[test]
     fn a_fine_pattern_far_away_is_grey() {
         let scene = textured(ground(2.0, 1), checker());
-        let map = map_of(
+        let map = flat_map_of(
             &scene,
             perspective(DVec3::new(0.0, -500.0, 100.0), 0.003, 1.0),
         );
@@ -429,7 +613,7 @@ mod tests {
         };
         let scene = scene_of(mesh, material);
         let camera = perspective(DVec3::new(1.0, -3.0, 1.5), 0.2, 1.0);
-        let picture = render_map(&scene, &map_of(&scene, camera), &unlit(40, 40));
+        let picture = render_map(&scene, &flat_map_of(&scene, camera), &unlit(40, 40));
         let world_from_eye = camera.eye_from_world.inverse();
         let eye = world_from_eye.transform_point3(DVec3::ZERO);
         for (pixel, found) in picture
@@ -465,7 +649,7 @@ mod tests {
             (DVec3::new(0.3, -3.0, -2.0), -Vec3::Z),
         ] {
             let camera = perspective(eye, 0.1, 1.0);
-            let expected = render_map(&flat, &map_of(&flat, camera), &settings);
+            let expected = render_map(&flat, &flat_map_of(&flat, camera), &settings);
             let light = 0.6 * Daylight::default().on(seen_normal);
             assert!(
                 (Vec3::from_slice(&expected.pixels[210]) - light)
@@ -479,7 +663,7 @@ mod tests {
                 mesh.normals = vec![normal; mesh.positions.len()];
                 mesh.normals[4] *= 1.000_001;
                 let scene = scene_of(mesh, material());
-                let picture = render_map(&scene, &map_of(&scene, camera), &settings);
+                let picture = render_map(&scene, &flat_map_of(&scene, camera), &settings);
                 for (found, expected) in picture.pixels.iter().zip(&expected.pixels) {
                     for (a, b) in found.iter().zip(expected) {
                         assert!((a - b).abs() < 1e-6, "{found:?} and not {expected:?}");
@@ -510,7 +694,7 @@ mod tests {
         let with_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("a thread pool").install(|| {
-                let picture = render_map(&scene, &map_of(&scene, camera), &settings);
+                let picture = render_map(&scene, &flat_map_of(&scene, camera), &settings);
                 let bits = |pixel: &[f32; 4]| pixel.map(f32::to_bits);
                 picture.pixels.iter().map(bits).collect::<Vec<_>>()
             })
@@ -521,7 +705,7 @@ mod tests {
     #[test]
     fn a_window_is_cut_from_the_picture() {
         let scene = textured(ground(2.0, 6), checker());
-        let map = map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
+        let map = flat_map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
         let grid = PixelGrid::of_frame(60, 60);
         let whole = render_window(&scene, &map, &grid, false);
         let window = render_window(&scene, &map, &grid.window(20.0, 33.0, 25, 19), false);
@@ -534,13 +718,68 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_made_in_strips_is_the_maps() {
+        let leaves = crate::scene::generate::by_name("leaves20").expect("a scene");
+        let settings = RenderSettings {
+            width: 120,
+            height: 77,
+            ..RenderSettings::default()
+        };
+        let (scene, camera) = (&leaves.scene, &leaves.camera);
+        let faces = visibility::project(scene, camera);
+        assert!(faces.len() > 120 * 77, "a crowded picture");
+        let map = find_visibility(scene, camera);
+        let expected = render_map(scene, &map, &settings);
+        for strips in [1, 3, 200] {
+            let found = render_strips(scene, camera, &faces, strips, &settings, |_| {});
+            for (a, b) in found.picture.pixels.iter().zip(&expected.pixels) {
+                for (a, b) in a.iter().zip(b) {
+                    assert!((a - b).abs() < 1e-5, "{strips} strips: {a} and {b}");
+                }
+            }
+            assert_eq!(found.shortcomings, shortcomings(scene, &map));
+        }
+        let mut steps = Vec::new();
+        render(scene, camera, &settings, |step| steps.push(step));
+        assert!(matches!(steps[1], Step::Strip { .. }), "{steps:?}");
+    }
+
+    #[test]
+    fn multiscan_comes_to_the_exact_picture_with_more_sub_scanlines() {
+        let scene = textured(ground(2.0, 3), checker());
+        let camera = perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.5);
+        let error_of = |n: u32| {
+            let picture = |sampling| {
+                let settings = RenderSettings {
+                    sampling,
+                    ..unlit(72, 48)
+                };
+                render(&scene, &camera, &settings, |_| {}).picture
+            };
+            let (exact, found) = (picture(Sampling::Exact), picture(Sampling::Multiscan(n)));
+            let pairs = found
+                .pixels
+                .iter()
+                .flatten()
+                .zip(exact.pixels.iter().flatten());
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        // Along the nearly level far side of the ground an error of half a sub-scanline is likely.
+        for n in [1, 4, 16, 64] {
+            let error = error_of(n);
+            assert!(error < 1.0 / n as f32, "{error} with {n} sub-scanlines");
+            assert!(error > 0.0, "multiscan is not exact");
+        }
+    }
+
+    #[test]
     fn materials_that_are_drawn_as_they_are_not_are_named() {
         let material = Material {
             alpha_mode: AlphaMode::Mask(0.5),
             ..Material::default()
         };
         let scene = scene_of(ground(2.0, 2), material);
-        let map = map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
+        let map = flat_map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
         let found = shortcomings(&scene, &map);
         assert_eq!(found, [Shortcoming::DrawnOpaque(MaterialId(0))]);
         let opaque = scene_of(ground(2.0, 2), Material::default());

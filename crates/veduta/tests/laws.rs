@@ -12,9 +12,9 @@ use support::coverage::{self, exceeds, largest_difference};
 use support::samples;
 use support::scenes::{LARGE, Scene};
 use veduta::geometry::{DVec2, DVec3};
-use veduta::map::{Camera, Faces, Fragment, Projection, Side, VisibilityMap};
+use veduta::map::{Camera, FaceId, Faces, Fragment, Fragments, Projection, Side, VisibilityMap};
 use veduta::visibility::speculative::{self, Report};
-use veduta::visibility::{Seen, cross_scanline};
+use veduta::visibility::{Seen, Strip, Strips, cross_scanline};
 
 /// A way to find visibility.
 struct Engine {
@@ -65,6 +65,7 @@ fn clip(scene: &Scene, guess: bool, cells: Option<u32>) -> (Seen, Report) {
         guess,
         aspect,
         cells,
+        ..speculative::Settings::default()
     };
     speculative::find_and_report(&scene.faces, &settings)
 }
@@ -151,6 +152,55 @@ fn all_engines_see_the_same_areas() {
     if seeds.len() > 1 {
         assert!(counts.iter().all(|&count| count > 0), "a kind is missing");
     }
+}
+
+#[test]
+fn strips_show_what_the_frame_shows_there() {
+    let failures: Vec<String> = seeds(SCENES / 5)
+        .par_iter()
+        .filter_map(|&seed| {
+            let scene = Scene::random(seed);
+            let strips = strip_by_strip(&scene.faces, 2 + seed as u32 % 9);
+            let results = [("frame", clip(&scene, true, None).0), ("strips", strips)];
+            let error = largest_error(&scene, &results).err()?;
+            Some(format!("{scene}: {error}"))
+        })
+        .collect();
+    report(&failures);
+}
+
+/// Finds what is seen in each of `count` strips, and puts the strips together again. Sides are not
+/// told: they would name lines of the strips' faces.
+fn strip_by_strip(faces: &Faces, count: u32) -> Seen {
+    let borders = (0..=count).map(|k| f64::from(k) / f64::from(count));
+    let strips = Strips::new(faces, borders.collect());
+    let mut pieces: [Vec<(FaceId, Vec<DVec2>)>; 2] = Default::default();
+    for index in 0..strips.len() {
+        let Strip { faces, parts_of } = strips.cut(index);
+        let settings = speculative::Settings {
+            strip: strips.extent(index),
+            ..speculative::Settings::default()
+        };
+        let seen = speculative::find(&faces, &settings);
+        for (pieces, fragments) in pieces.iter_mut().zip([seen.opaque, seen.veils]) {
+            pieces.extend(fragments.iter().map(|fragment| {
+                let polygon = match fragment {
+                    Fragment::Whole(face) => faces.outline(face),
+                    Fragment::Cut { vertices, .. } => vertices,
+                };
+                (parts_of[fragment.face().index()], polygon.to_vec())
+            }));
+        }
+    }
+    let [opaque, veils] = pieces.map(|mut pieces| {
+        pieces.sort_by_key(|piece| piece.0);
+        let mut fragments = Fragments::new();
+        for (face, polygon) in pieces {
+            fragments.push_cut(face, polygon.into_iter().map(|p| (p, Side::scan(face))));
+        }
+        fragments
+    });
+    Seen { opaque, veils }
 }
 
 fn report(failures: &[String]) {

@@ -19,7 +19,7 @@ fn picture(name: &str) -> Picture {
         unlit: true,
         ..RenderSettings::default()
     };
-    render(&scene.scene, &scene.camera, &settings)
+    render(&scene.scene, &scene.camera, &settings, |_| {}).picture
 }
 
 /// Coverage of a pixel.

@@ -8,9 +8,10 @@ use crate::values::{self, FieldOfView, Size};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use veduta::map::{Camera, Projection};
-use veduta::pipeline::{self, RenderSettings, Sampling, Shortcoming};
+use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::DVec3;
+use veduta_io::scaled;
 
 /// Make a picture of a model
 ///
@@ -101,52 +102,60 @@ impl Render {
         let camera = self.view.camera(&self.model, &scene, self.size)?;
         let development = self.look.development(&scene, self.strict, talk)?;
 
+        let screen = self.output.preview.and_then(Screen::of);
+        if target.is_none() && screen.is_none() {
+            let message =
+                "nothing is shown: stdout is no terminal; --preview=blocks shows it there";
+            talk.warn(message.to_owned());
+            return Ok(());
+        }
+        let size = [self.size.width, self.size.height];
+        let preview_size = screen.map(|screen| screen.size_of(size[0], size[1]));
+        // A preview alone is made in its own size: areas are exact in any.
+        let [width, height] = match (&target, preview_size) {
+            (None, Some(preview_size)) => preview_size,
+            _ => size,
+        };
         let settings = RenderSettings {
-            width: self.size.width,
-            height: self.size.height,
+            width,
+            height,
             sampling: self.sampling,
             unlit: self.look.unlit,
         };
-        if self.sampling != Sampling::Exact {
-            let message = "--sampling multiscan makes no pictures yet; leave it out";
-            return Err(Failure::new(Code::Unsupported, message));
-        }
-        talk.begin("finding visibility");
-        let map = pipeline::find_visibility(&scene, &camera);
-        self.tell_shortcomings(&scene, &pipeline::shortcomings(&scene, &map), talk)?;
-        let mut ev = None;
+        let Rendered {
+            mut picture,
+            shortcomings,
+        } = pipeline::render(&scene, &camera, &settings, |step| match step {
+            Step::Projecting => talk.begin("projecting"),
+            Step::FindingVisibility => talk.begin("finding visibility"),
+            Step::Shading => talk.begin("shading"),
+            Step::Strip { index, count } => {
+                if index == 0 {
+                    talk.begin("rendering strip by strip");
+                }
+                talk.part(index, count);
+            }
+            _ => {}
+        });
+        self.tell_shortcomings(&scene, &shortcomings, talk)?;
+        talk.begin("developing");
+        // Before it is developed, since pictures are scaled in linear light.
+        let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
+        let mut ev = 0.0;
         if let Some(target) = &target {
-            talk.begin("shading");
-            let mut picture = pipeline::render_map(&scene, &map, &settings);
-            talk.begin("developing");
-            ev = Some(development.develop(&mut picture, !target.linear));
+            ev = development.develop(&mut picture, !target.linear);
             talk.begin("writing");
             target.write(&picture)?;
         }
-        if let Some(screen) = self.output.preview.and_then(Screen::of) {
-            talk.begin("previewing");
-            // From the map, not from the picture: it has no resolution, so that a small picture is as
-            // exact as a large one and costs less than scaling that.
-            let [width, height] = screen.size_of(self.size.width, self.size.height);
-            let settings = RenderSettings {
-                width,
-                height,
-                ..settings
-            };
-            let mut picture = pipeline::render_map(&scene, &map, &settings);
-            match (ev, &target) {
-                (Some(ev), Some(target)) if !target.linear => {
-                    development.develop_at(&mut picture, ev, true);
-                }
-                _ => {
-                    ev = Some(development.develop(&mut picture, true));
-                }
+        if let (Some(screen), Some(preview)) = (screen, &mut preview) {
+            match &target {
+                Some(target) if !target.linear => development.develop_at(preview, ev, true),
+                _ => ev = development.develop(preview, true),
             }
             talk.end();
-            print_bytes(&screen.show(&picture))?;
+            print_bytes(&screen.show(preview))?;
         }
         talk.end();
-        let ev = ev.unwrap_or(0.0);
         talk.detail(format_args!(
             "{} faces, exposure {ev:.2} EV",
             scene.face_count()

@@ -28,15 +28,24 @@ impl Budget {
         self.input = self.input.saturating_add(bytes as u64);
     }
 
+    /// Bytes that may still be asked for.
+    #[cfg(feature = "draco")]
+    pub fn left(&self) -> u64 {
+        self.allowed().saturating_sub(self.spent)
+    }
+
+    fn allowed(&self) -> u64 {
+        FREE.saturating_add(self.input.saturating_mul(PER_INPUT_BYTE))
+    }
+
     /// Takes `rows` rows of `row_bytes` bytes from the budget.
     ///
     /// # Errors
     /// [`Problem::TooLarge`] when they are not to be had.
     pub fn charge(&mut self, rows: u64, row_bytes: usize) -> Result<(), Problem> {
         let asked = rows.saturating_mul(row_bytes as u64);
-        let allowed = FREE.saturating_add(self.input.saturating_mul(PER_INPUT_BYTE));
         let spent = self.spent.saturating_add(asked);
-        if spent > allowed {
+        if spent > self.allowed() {
             return Err(Problem::TooLarge {
                 asked,
                 input: self.input,

@@ -24,7 +24,7 @@ impl ReadError {
             Problem::Unreadable(_) => ErrorKind::InputOutput,
             Problem::UnknownFormat { .. }
             | Problem::Version { .. }
-            | Problem::RequiredExtension(_)
+            | Problem::RequiredExtension { .. }
             | Problem::RemoteUri(_) => ErrorKind::Unsupported,
             Problem::NotThere { .. } | Problem::NoBinChunk => ErrorKind::Missing,
             _ => ErrorKind::BadInput,
@@ -115,8 +115,21 @@ pub enum Problem {
     #[error("is not valid glTF: {0}")]
     Json(String),
     /// The file says that it cannot be understood without an extension.
-    #[error("the extension {0} is required but not supported; export the model without it")]
-    RequiredExtension(String),
+    #[error("the extension {name} is required but not supported; {mend}")]
+    RequiredExtension {
+        /// Its name.
+        name: String,
+        /// What a user can do.
+        mend: &'static str,
+    },
+    /// Compressed data that does not decompress.
+    #[error("the {codec} data does not decompress: {reason}; the file is damaged")]
+    Compressed {
+        /// How it is compressed.
+        codec: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// A file that the file names is not there, or is no file.
     #[error("names {}, which cannot be read: {source}; put it there or export to .glb", path.display())]
     NotThere {

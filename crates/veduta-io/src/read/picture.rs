@@ -21,14 +21,15 @@ impl PictureDecoder {
         Self { left: MOST_BYTES }
     }
 
-    /// Decodes PNG or JPEG, told apart by their first bytes.
+    /// Decodes PNG, JPEG or WebP, told apart by their first bytes.
     ///
     /// # Errors
     /// A sentence for a warning: a broken texture is no reason to lose the model.
     pub fn decode(&mut self, name: &str, bytes: &[u8]) -> Result<Image, String> {
         let format = image::guess_format(bytes).ok();
-        let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg)) = format else {
-            return Err("is neither PNG nor JPEG".into());
+        let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
+        let Some(format) = format.filter(|format| known.contains(format)) else {
+            return Err("is neither PNG nor JPEG nor WebP".into());
         };
         let mut limits = Limits::default();
         limits.max_image_width = Some(MOST_SIDE);

@@ -51,7 +51,11 @@ fn assert_sound(scene: &Scene, case: impl std::fmt::Display) {
         );
         assert!(object.world_from_object.is_finite(), "{case}: transforms");
     }
-    for texture in scene.materials.iter().filter_map(|m| m.base_color_texture) {
+    let textures = scene
+        .materials
+        .iter()
+        .flat_map(|m| [m.base_color_texture, m.emissive_texture]);
+    for texture in textures.flatten() {
         assert!(
             (texture.image.0 as usize) < scene.images.len(),
             "{case}: images"
@@ -68,6 +72,13 @@ fn assert_sound(scene: &Scene, case: impl std::fmt::Display) {
         assert!(
             camera.eye_from_world.is_finite() && camera.near.is_finite(),
             "{case}: cameras"
+        );
+    }
+    for light in &scene.lights {
+        assert!(
+            light.world_from_light.is_finite()
+                && (light.world_from_light.determinant() - 1.0).abs() < 1e-6,
+            "{case}: lights"
         );
     }
 }
@@ -122,6 +133,69 @@ fn rich_glb() -> Glb {
     glb
 }
 
+/// A GLB of what stands otherwise than its vertices say: a skin of two joints, morph targets, one of
+/// them sparse, instances, a light, and a second set of texture coordinates.
+fn posed_glb() -> Glb {
+    let mut glb = Glb::triangle();
+    let joints = glb.accessor(&[0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0], 5121, "VEC4", 3);
+    let weights = glb.accessor(&[9, 9, 0, 0, 255, 0, 0, 0, 1, 0, 0, 0], 5121, "VEC4", 3);
+    glb.json["accessors"][weights]["normalized"] = json!(true);
+    let identity = |k: usize| if k % 5 == 0 { 1.0f32 } else { 0.0 };
+    let matrices: Vec<u8> = (0..32)
+        .flat_map(|k| identity(k % 16).to_le_bytes())
+        .collect();
+    let matrices = glb.accessor(&matrices, 5126, "MAT4", 2);
+    let sparse_at = glb.view(&[1]);
+    let sparse_value = glb.view(&[0, 0, 128, 63, 0, 0, 0, 0, 0, 0, 0, 64]);
+    let target = glb.add(
+        "accessors",
+        json!({
+            "componentType": 5126, "type": "VEC3", "count": 3,
+            "sparse": { "count": 1,
+                "indices": { "bufferView": sparse_at, "componentType": 5121 },
+                "values": { "bufferView": sparse_value } },
+        }),
+    );
+    let places = glb.f32s("VEC3", &[0.0, 0.0, 0.0, 2.0, 0.0, 0.0]);
+    let turns = glb.accessor(&[0, 0, 0, 127, 0, 127, 0, 0], 5120, "VEC4", 2);
+    glb.json["accessors"][turns]["normalized"] = json!(true);
+    let texcoord = glb.f32s("VEC2", &[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    let picture = glb.view(&small_png());
+    glb.add("images", json!({ "bufferView": picture }));
+    glb.add(
+        "textures",
+        json!({ "source": 0, "extensions": { "EXT_texture_webp": { "source": 0 } } }),
+    );
+    glb.add(
+        "materials",
+        json!({
+            "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0, "texCoord": 1 },
+            "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } },
+        }),
+    );
+    glb.json["meshes"][0] = json!({
+        "weights": [0.5, 0.25],
+        "primitives": [{
+            "attributes": { "POSITION": 0, "JOINTS_0": joints, "WEIGHTS_0": weights,
+                "TEXCOORD_0": texcoord, "TEXCOORD_1": texcoord },
+            "targets": [{ "POSITION": target }, { "POSITION": 0, "NORMAL": 0 }],
+            "indices": 1, "material": 0,
+        }],
+    });
+    glb.json["skins"] = json!([{ "joints": [1, 2], "inverseBindMatrices": matrices }]);
+    glb.json["nodes"] = json!([
+        { "mesh": 0, "skin": 0, "children": [1, 2, 3] },
+        { "translation": [0, 1, 0] },
+        { "rotation": [0, 0, 1, 0], "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+        { "mesh": 0, "weights": [1, 0], "extensions": { "EXT_mesh_gpu_instancing": {
+            "attributes": { "TRANSLATION": places, "ROTATION": turns } } } },
+    ]);
+    glb.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "spot", "intensity": 3, "range": 9, "spot": { "outerConeAngle": 0.5 } }
+    ] } });
+    glb
+}
+
 const RICH_OBJ: &str = "mtllib none.mtl\no one\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1e-3\n\
     vt 0 0\nvt 1 1\nvn 0 0 1\ng part\nusemtl red\nf 1/1/1 2/2/1 3//1 4\nf -4 -3 \\\n-2\nl 1 2\n\
     s off\no two\nf 1 2 3\nf 4 3 2 1 2 3\n";
@@ -173,13 +247,90 @@ fn a_glb_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
 }
 
 #[test]
+fn a_posed_glb_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
+    read_damaged("m.glb", &posed_glb().bytes());
+}
+
+/// How many damaged variants of a compressed file are read. `VEDUTA_DAMAGE` asks for another number.
+fn compressed_cases() -> usize {
+    let asked = std::env::var("VEDUTA_DAMAGE").ok();
+    asked.map_or(4000, |asked| asked.parse().expect("a number of variants"))
+}
+
+/// Reads variants of a compressed file: its stream cut, bits of it flipped, bytes of it replaced.
+#[cfg(feature = "meshopt")]
+fn read_damaged_streams(sound: &[u8]) {
+    let folder = Folder::new();
+    assert!(check("m.glb", folder.read("m.glb", sound), "undamaged"));
+    let json = u32::from_le_bytes(sound[12..16].try_into().expect("four bytes"));
+    let start = 12 + 8 + json as usize + 8;
+    let (mut read, cases) = (0, compressed_cases());
+    for seed in 0..cases {
+        let mut random = Random(seed as u64);
+        let mut bytes = sound.to_vec();
+        for _ in 0..=random.below(3) {
+            let place = start + random.below(bytes.len() - start);
+            match random.below(4) {
+                // The zeros stand for what is cut off, so that the container stays sound.
+                0 => bytes[place..].fill(0),
+                1 => bytes[place] = random.below(256) as u8,
+                2 => bytes[place] = 255,
+                _ => bytes[place] ^= 1 << random.below(8),
+            }
+        }
+        let loaded = folder.read("m.glb", &bytes);
+        read += usize::from(check("m.glb", loaded, format!("seed {seed}")));
+    }
+    assert!(
+        0 < read && read < cases,
+        "{read} of {cases} damaged files were read"
+    );
+    let peak = MEMORY.peak_usage();
+    assert!(peak < MOST_MEMORY, "{peak} bytes");
+}
+
+#[cfg(feature = "meshopt")]
+#[test]
+fn damaged_meshopt_streams_are_read_or_refused() {
+    read_damaged_streams(crate::compressed::MESHOPT_EXT);
+    read_damaged_streams(crate::compressed::MESHOPT_KHR);
+}
+
+#[cfg(feature = "draco")]
+#[test]
+fn damaged_draco_streams_are_read_or_refused() {
+    read_damaged_streams(crate::compressed::EDGEBREAKER);
+    read_damaged_streams(crate::compressed::SEQUENTIAL);
+}
+
+#[test]
 fn an_obj_cut_anywhere_or_with_any_bit_flipped_is_read_or_refused() {
     read_damaged("m.obj", RICH_OBJ.as_bytes());
 }
 
 #[test]
 fn json_with_wrong_values_anywhere_is_read_or_refused() {
-    let sound = rich_glb();
+    read_wrong_values(&rich_glb());
+}
+
+#[test]
+fn json_of_poses_with_wrong_values_anywhere_is_read_or_refused() {
+    read_wrong_values(&posed_glb());
+}
+
+#[cfg(feature = "meshopt")]
+#[test]
+fn json_of_compressed_views_with_wrong_values_anywhere_is_read_or_refused() {
+    read_wrong_values(&Glb::from_bytes(crate::compressed::MESHOPT_KHR));
+}
+
+#[cfg(feature = "draco")]
+#[test]
+fn json_of_compressed_primitives_with_wrong_values_anywhere_is_read_or_refused() {
+    read_wrong_values(&Glb::from_bytes(crate::compressed::EDGEBREAKER));
+}
+
+fn read_wrong_values(sound: &Glb) {
     let folder = Folder::new();
     let values = [
         json!(0),

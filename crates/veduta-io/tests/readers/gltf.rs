@@ -331,10 +331,7 @@ fn textures_that_cannot_be_had_are_warned_of() {
     let texts: Vec<_> = loaded.warnings.iter().map(ToString::to_string).collect();
     assert_eq!(texts.len(), 3, "{texts:?}");
     for (text, place) in texts.iter().zip(["images[0]", "images[1]", "textures[2]"]) {
-        assert!(
-            text.contains(place) && text.ends_with("the plain colour is shown"),
-            "{text}"
-        );
+        assert!(text.contains(place) && text.ends_with("left out"), "{text}");
     }
     let textures = loaded
         .scene
@@ -354,9 +351,16 @@ fn wrong_files_are_refused_with_place_and_reason() {
             ": asset.version: is glTF 1.0, expected glTF 2.0",
         ),
         (
-            |glb| glb.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]),
+            |glb| glb.json["extensionsRequired"] = json!(["KHR_lights_punctual", "EXT_other"]),
             ErrorKind::Unsupported,
-            ": extensionsRequired[0]: the extension KHR_draco_mesh_compression is required",
+            ": extensionsRequired[1]: the extension EXT_other is required but not supported; \
+             export the model without it",
+        ),
+        (
+            |glb| glb.json["extensionsRequired"] = json!(["KHR_texture_basisu"]),
+            ErrorKind::Unsupported,
+            ": extensionsRequired[0]: the extension KHR_texture_basisu is required but not \
+             supported; export the model with textures in PNG, JPEG or WebP",
         ),
         (
             |glb| glb.json["accessors"][0]["count"] = json!("three"),

@@ -69,6 +69,16 @@ impl Glb {
         glb
     }
 
+    /// Takes a sound file apart.
+    pub fn from_bytes(bytes: &[u8]) -> Self {
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four"));
+        let json = 20 + word(12) as usize;
+        Self {
+            json: serde_json::from_slice(&bytes[20..json]).expect("sound JSON"),
+            bin: bytes[json + 8..].to_vec(),
+        }
+    }
+
     /// Adds a row to a table; its index.
     pub fn add(&mut self, table: &str, row: Value) -> usize {
         let table = &mut self.json[table];

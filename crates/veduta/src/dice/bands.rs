@@ -1,3 +1,4 @@
+use crate::buckets::Buckets;
 use crate::dice::PixelGrid;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -12,13 +13,11 @@ pub const BAND_ROWS: u32 = 16;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bands {
     grid: PixelGrid,
-    /// `fragments[start[b]..start[b + 1]]` touch band `b`, ascending.
-    start: Vec<usize>,
-    fragments: Vec<u32>,
+    fragments: Buckets,
 }
 
 impl Bands {
-    /// Sorts the opaque fragments of `map` into the bands of `grid` (a counting sort).
+    /// Sorts the opaque fragments of `map` into the bands of `grid`.
     pub fn new(map: &VisibilityMap, grid: PixelGrid) -> Self {
         assert!(
             grid.pixels_per_frame.cmpgt(DVec2::ZERO).all(),
@@ -30,29 +29,9 @@ impl Bands {
             .with_min_len(1024)
             .map(|fragment| bands_touched(map, &map.opaque, fragment, &grid))
             .collect();
-
-        let mut start = vec![0; count + 1];
-        for bands in &touched {
-            for band in bands.clone() {
-                start[band as usize + 1] += 1;
-            }
-        }
-        for band in 0..count {
-            start[band + 1] += start[band];
-        }
-        let mut next = start.clone();
-        let mut fragments = vec![0; start[count]];
-        for (fragment, bands) in touched.iter().enumerate() {
-            for band in bands.clone() {
-                let place = &mut next[band as usize];
-                fragments[*place] = fragment as u32;
-                *place += 1;
-            }
-        }
         Self {
             grid,
-            start,
-            fragments,
+            fragments: Buckets::new(count, &touched),
         }
     }
 
@@ -63,7 +42,7 @@ impl Bands {
 
     /// Number of bands.
     pub fn len(&self) -> usize {
-        self.start.len() - 1
+        self.fragments.len()
     }
 
     /// Whether there are no bands. There is always one.
@@ -79,7 +58,7 @@ impl Bands {
 
     /// Opaque fragments that touch band `band`, ascending.
     pub fn fragments(&self, band: usize) -> &[u32] {
-        &self.fragments[self.start[band]..self.start[band + 1]]
+        self.fragments.of(band)
     }
 }
 

@@ -312,3 +312,42 @@ fn centroids_of_the_parts_of_a_face_average_to_its_own() {
     let expected = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
     assert!((centroid - expected).length() < 1e-7);
 }
+
+#[test]
+fn parts_of_spans_have_the_areas_of_the_paper() {
+    use crate::visibility::multiscan::find_spans;
+    let made = crate::scene::generate::by_name("balls3").expect("a generated scene");
+    let faces = crate::visibility::project(&made.scene, &made.camera);
+    for n in [1, 3] {
+        let (width, height) = (97_u32, 50_u32);
+        let spans = find_spans(&faces, width, height, n);
+        // A colour that tells faces apart.
+        let color = |face: FaceId| [(face.0 % 7) as f32, (face.0 % 5) as f32, 1.0, 1.0];
+        let expected = spans.picture(color);
+        let mut parts = Parts::default();
+        dice_spans(
+            &spans,
+            0..height,
+            |face| face.0,
+            &mut SpanDicer::default(),
+            &mut parts,
+        );
+        assert!(!parts.runs.is_empty(), "some pixels are filled");
+        let mut found = vec![[0.0_f32; 4]; (width * height) as usize];
+        let mut add = |pixel: usize, fragment: u32, area: f32| {
+            for (sum, value) in found[pixel].iter_mut().zip(color(FaceId(fragment))) {
+                *sum += area * value;
+            }
+        };
+        for part in &parts.boundary {
+            assert!(part.centroid.min_element() >= 0.0 && part.centroid.max_element() <= 1.0);
+            add(part.pixel as usize, part.fragment, part.area);
+        }
+        for run in &parts.runs {
+            run.pixels().for_each(|pixel| add(pixel, run.fragment, 1.0));
+        }
+        for (a, b) in found.iter().flatten().zip(expected.pixels.iter().flatten()) {
+            assert!((a - b).abs() < 2e-5, "{a} and {b}");
+        }
+    }
+}

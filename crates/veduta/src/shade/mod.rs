@@ -4,10 +4,10 @@
 //! two right colours; pixels that one face fills are evaluated at their centres. Colours are linear
 //! Rec.709.
 //!
-//! 1. [`Surfaces`] looks once at each seen face. Most have one colour all over (no texture, no
+//! 1. [`Textures`] makes pyramids of the pictures in use (`texture.rs`).
+//! 2. [`Surfaces`] looks once at each seen face. Most have one colour all over (no texture, no
 //!    interpolated normal): it is worked out here, and their parts cost a look-up. The others are made
 //!    ready for evaluation anywhere (`surface.rs`).
-//! 2. Pyramids of the pictures in use are made (`texture.rs`).
 //! 3. [`Surfaces::shade`] evaluates the parts of a band.
 //!
 //! The light is a stand-in, a sun and a plain sky ([`light`]); those of the scene
@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 use surface::{PicturePoint, Surface, SurfacePoint, Varying, Viewer};
 use texture::Pyramid;
 use veduta_geometry::{DVec2, Vec3};
-use veduta_map::{FaceId, VisibilityMap};
+use veduta_map::{Camera, FaceId, Faces, MaterialId};
 
 /// Radiance of the parts of a band: linear RGB.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,70 +54,87 @@ impl Radiance {
     }
 }
 
-/// The seen faces of a map, made ready for shading.
-pub struct Surfaces<'a> {
-    scene: &'a Scene,
-    light: Daylight,
-    unlit: bool,
-    /// Of each opaque fragment.
-    surfaces: Vec<Surface>,
-    varying: Vec<Varying>,
-    /// By image, for those in use.
+/// Pictures of a scene made ready for shading: pyramids of those in use.
+pub struct Textures<'a> {
+    /// By image.
     pyramids: Vec<Option<Pyramid<'a>>>,
 }
 
-impl<'a> Surfaces<'a> {
-    /// Looks at the faces that are seen in `map`, a map of `scene`. With `unlit`, materials show their
-    /// colour as it is.
-    pub fn new(scene: &'a Scene, map: &VisibilityMap, light: Daylight, unlit: bool) -> Self {
-        let viewer = Viewer::new(scene, map, &light, unlit);
-        let mut surfaces: Vec<Surface> = (0..map.opaque.len())
-            .into_par_iter()
-            .with_min_len(256)
-            .map(
-                |fragment| match viewer.constant(map.opaque.face(fragment)) {
-                    Some(radiance) => Surface::Constant(radiance),
-                    None => Surface::Varying(0),
-                },
-            )
-            .collect();
-
-        // Fragments ascend by face: a face that is seen in pieces gets one row.
-        let mut faces: Vec<FaceId> = Vec::new();
-        for (fragment, surface) in surfaces.iter_mut().enumerate() {
-            if let Surface::Varying(row) = surface {
-                let face = map.opaque.face(fragment);
-                if faces.last() != Some(&face) {
-                    faces.push(face);
-                }
-                *row = faces.len() as u32 - 1;
-            }
-        }
-        let varying: Vec<Varying> = faces.par_iter().map(|&face| viewer.varying(face)).collect();
-        let images: BTreeSet<ImageId> = varying
+impl<'a> Textures<'a> {
+    /// Prepares the pictures of `materials`.
+    pub fn new(scene: &'a Scene, materials: &BTreeSet<MaterialId>) -> Self {
+        let images: BTreeSet<ImageId> = materials
             .iter()
-            .flat_map(|face| {
-                let material = scene.material(face.material);
+            .flat_map(|&material| {
+                let material = scene.material(material);
                 [material.base_color_texture, material.emissive_texture]
             })
             .flatten()
             .map(|texture| texture.image)
             .collect();
-        let pyramids = (0..scene.images.len())
-            .into_par_iter()
-            .map(|index| {
-                images
-                    .contains(&ImageId(index as u32))
-                    .then(|| Pyramid::new(&scene.images[index]))
+        let pyramids = scene.images.par_iter().enumerate().map(|(index, image)| {
+            let is_used = images.contains(&ImageId(index as u32));
+            is_used.then(|| Pyramid::new(image))
+        });
+        Self {
+            pyramids: pyramids.collect(),
+        }
+    }
+}
+
+/// The faces that a picture shows, made ready for shading.
+pub struct Surfaces<'a> {
+    scene: &'a Scene,
+    textures: &'a Textures<'a>,
+    light: Daylight,
+    unlit: bool,
+    /// Of each fragment.
+    surfaces: Vec<Surface>,
+    varying: Vec<Varying>,
+}
+
+impl<'a> Surfaces<'a> {
+    /// Looks at what `camera` sees of `scene`: `shown` are the faces of the fragments that
+    /// [`Parts`] refer to, ascending. `textures` hold the pictures of all their materials. With
+    /// `unlit`, materials show their colour as it is.
+    pub fn new(
+        scene: &'a Scene,
+        textures: &'a Textures<'a>,
+        camera: &Camera,
+        faces: &Faces,
+        shown: &[FaceId],
+        light: Daylight,
+        unlit: bool,
+    ) -> Self {
+        let viewer = Viewer::new(scene, camera, faces, &light, unlit);
+        let mut surfaces: Vec<Surface> = shown
+            .par_iter()
+            .with_min_len(256)
+            .map(|&face| match viewer.constant(face) {
+                Some(radiance) => Surface::Constant(radiance),
+                None => Surface::Varying(0),
             })
             .collect();
+
+        // A face that is seen in pieces gets one row.
+        let mut varying: Vec<FaceId> = Vec::new();
+        for (&face, surface) in shown.iter().zip(&mut surfaces) {
+            if let Surface::Varying(row) = surface {
+                if varying.last() != Some(&face) {
+                    varying.push(face);
+                }
+                *row = varying.len() as u32 - 1;
+            }
+        }
+        let varying = varying.par_iter().map(|&face| viewer.varying(face));
+        let varying = varying.collect();
         Self {
             scene,
+            textures,
             light,
             unlit,
             surfaces,
             varying,
-            pyramids,
         }
     }
 
@@ -193,7 +210,7 @@ impl<'a> Surfaces<'a> {
 
     /// Mean colour of a texture in the footprint of a pixel.
     fn texel(&self, texture: &TextureRef, place: &PicturePoint, grid: &PixelGrid) -> Vec3 {
-        let pyramid = self.pyramids[texture.image.0 as usize]
+        let pyramid = self.textures.pyramids[texture.image.0 as usize]
             .as_ref()
             .expect("pyramids of all pictures in use are made");
         let pixel = grid.pixels_per_frame;

@@ -4,7 +4,7 @@ use crate::scene::{Material, Scene, TextureRef};
 use crate::shade::light::Daylight;
 use crate::shade::texture::picture_from_uv;
 use veduta_geometry::{DMat3, DMat4, DVec2, DVec3, Vec3};
-use veduta_map::{Affine, Camera, FaceId, MaterialId, ObjectId, Projection, VisibilityMap};
+use veduta_map::{Affine, Camera, FaceId, Faces, MaterialId, ObjectId, Projection};
 
 /// How the radiance of a face goes over it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,10 +112,11 @@ impl Corners {
     }
 }
 
-/// Looks at the faces of a map from its eye.
+/// Looks at projected faces from the eye that sees them.
 pub struct Viewer<'a> {
     scene: &'a Scene,
-    map: &'a VisibilityMap,
+    camera: &'a Camera,
+    faces: &'a Faces,
     light: &'a Daylight,
     unlit: bool,
     world_from_eye: DMat3,
@@ -129,8 +130,14 @@ struct ObjectView {
 }
 
 impl<'a> Viewer<'a> {
-    pub fn new(scene: &'a Scene, map: &'a VisibilityMap, light: &'a Daylight, unlit: bool) -> Self {
-        let eye_from_world = map.camera.eye_from_world;
+    pub fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        faces: &'a Faces,
+        light: &'a Daylight,
+        unlit: bool,
+    ) -> Self {
+        let eye_from_world = camera.eye_from_world;
         let view = |object: &crate::scene::Object| ObjectView {
             eye_from_object: eye_from_world * object.world_from_object,
             world_normal_from_object: DMat3::from_mat4(object.world_from_object)
@@ -139,7 +146,8 @@ impl<'a> Viewer<'a> {
         };
         Self {
             scene,
-            map,
+            camera,
+            faces,
             light,
             unlit,
             world_from_eye: DMat3::from_mat4(eye_from_world).transpose(),
@@ -153,7 +161,7 @@ impl<'a> Viewer<'a> {
 
     /// The face's radiance if it is the same everywhere.
     pub fn constant(&self, face: FaceId) -> Option<[f32; 3]> {
-        let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
+        let (object, source) = (self.faces.object(face), self.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = self.scene.material_of(object, source);
         let lit = self.lit(material);
@@ -187,7 +195,7 @@ impl<'a> Viewer<'a> {
 
     /// The face made ready for evaluation from point to point.
     pub fn varying(&self, face: FaceId) -> Varying {
-        let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
+        let (object, source) = (self.faces.object(face), self.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = mesh.material_of(source);
         let textures = self.scene.material(material);
@@ -204,7 +212,7 @@ impl<'a> Viewer<'a> {
         };
         Varying {
             material,
-            corners: Corners::new(&self.map.camera, eye_corners, triangles.len() == 1),
+            corners: Corners::new(self.camera, eye_corners, triangles.len() == 1),
             face_normal: self.face_normal(&eye_corners),
             normals: has(mesh.normals.len()).map(|corners| {
                 // Normalised here: an object scaled unequally would weigh its corners otherwise.
@@ -233,7 +241,7 @@ impl<'a> Viewer<'a> {
     fn face_normal(&self, corners: &[DVec3; 3]) -> Vec3 {
         let [v0, v1, v2] = *corners;
         let normal = (v1 - v0).cross(v2 - v0).normalize_or_zero();
-        let away = match self.map.camera.projection {
+        let away = match self.camera.projection {
             Projection::Perspective { .. } => normal.dot(v0) > 0.0,
             Projection::Parallel { .. } => normal.z > 0.0,
         };

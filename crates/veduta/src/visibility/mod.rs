@@ -6,7 +6,8 @@
 //! - [`speculative`], the main one: guess with a z-buffer, clip exactly, verify, mend;
 //! - [`cross_scanline`]: Tanaka & Takahashi's sweep, the oracle of the other;
 //!
-//! and [`multiscan`], which samples on sub-scanlines and returns spans, a type of its own.
+//! and [`multiscan`], which samples on sub-scanlines and returns spans, a type of its own. [`Strips`]
+//! cuts the frame into parts that an engine can find one after the other.
 //!
 //! All obey one depth order. At a point of the image plane the face with the larger nearness is in
 //! front, as given by the faces' stored planes; of faces that share a plane the smaller id is.
@@ -16,8 +17,10 @@ pub mod cross_scanline;
 pub mod multiscan;
 mod project;
 pub mod speculative;
+mod strips;
 
 pub use project::project;
+pub use strips::{Strip, Strips};
 
 use veduta_map::Fragments;
 

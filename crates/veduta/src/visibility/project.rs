@@ -42,8 +42,9 @@ pub fn project(scene: &Scene, camera: &Camera) -> Faces {
                 view.project_faces(scene, object, start as u32..end as u32, groups)
             })
             .collect();
-        for part in &parts {
-            faces.append(part);
+        // Each is dropped when it is appended, so that there are never two copies of all.
+        for part in parts {
+            faces.append(&part);
         }
     }
     share_planes(&mut faces, groups.pairs());

@@ -6,6 +6,8 @@
 use super::buffers::{Buffers, slice};
 use super::document::{Accessor, Document, Index};
 use super::{Fault, Problem, row};
+use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// An accessor's elements, all of which are there.
 #[derive(Debug)]
@@ -17,7 +19,7 @@ pub struct Elements<'a> {
     component: Component,
     normalized: bool,
     /// The first element starts here. `None`: all are zero.
-    bytes: Option<&'a [u8]>,
+    bytes: Option<Cow<'a, [u8]>>,
     /// Bytes from one element to the next.
     stride: usize,
     sparse: Option<SparseElements<'a>>,
@@ -32,9 +34,26 @@ struct SparseElements<'a> {
     values: &'a [u8],
 }
 
+/// Bytes and components of the largest element, a matrix of four by four.
+const LARGEST_ELEMENT: usize = 64;
+
+/// Elements that a task decodes at a time.
+const ELEMENTS_PER_TASK: usize = 16 * 1024;
+
+/// A table that was decompressed: elements one after the other, in place of those an accessor's view
+/// would hold.
+#[cfg_attr(not(feature = "draco"), allow(dead_code))]
+#[derive(Debug)]
+pub struct Decompressed {
+    pub component: Component,
+    pub components: usize,
+    pub count: u64,
+    pub bytes: Vec<u8>,
+}
+
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Component {
+pub enum Component {
     I8,
     U8,
     I16,
@@ -62,7 +81,7 @@ impl Component {
         })
     }
 
-    fn size(self) -> usize {
+    pub fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -82,19 +101,7 @@ impl<'a> Elements<'a> {
         shapes: &'static str,
         at: &str,
     ) -> Result<Self, Fault> {
-        let (index, accessor) = row(&document.accessors, index, "accessor", at)?;
-        let at = format!("accessors[{index}]");
-        if !shapes.split(" or ").any(|shape| shape == accessor.shape) {
-            let found = format!("{:?}", accessor.shape.chars().take(16).collect::<String>());
-            let expected = shapes;
-            return Err(Problem::Illegal { found, expected }.at_json(format!("{at}.type")));
-        }
-        let components = match accessor.shape.as_str() {
-            "SCALAR" => 1,
-            "VEC2" => 2,
-            "VEC3" => 3,
-            _ => 4,
-        };
+        let (accessor, components, at) = accessor_of(document, index, shapes, at)?;
         let component = Component::of(accessor.component_type, &at)?;
         let size = component.size() * components;
         let (bytes, stride) = match accessor.buffer_view {
@@ -121,7 +128,8 @@ impl<'a> Elements<'a> {
                 };
                 let what = "the accessor, with its offset,";
                 let bytes = bytes_at(bytes, accessor.byte_offset, needed, what, &at)?;
-                (Some(bytes), usize::try_from(stride).unwrap_or(usize::MAX))
+                let stride = usize::try_from(stride).unwrap_or(usize::MAX);
+                (Some(Cow::Borrowed(bytes)), stride)
             }
         };
         Ok(Self {
@@ -131,7 +139,36 @@ impl<'a> Elements<'a> {
             normalized: accessor.normalized,
             bytes,
             stride,
-            sparse: sparse(accessor, size, buffers, &at)?,
+            sparse: sparse(accessor, accessor.count, size, buffers, &at)?,
+        })
+    }
+
+    /// The elements that a primitive's Draco stream holds for an accessor; whatever the accessor
+    /// points to itself is not looked at.
+    pub fn decompressed(
+        document: &'a Document,
+        buffers: &'a Buffers<'_>,
+        index: Index,
+        shapes: &'static str,
+        table: Decompressed,
+        at: &str,
+    ) -> Result<Self, Fault> {
+        let (accessor, components, at) = accessor_of(document, index, shapes, at)?;
+        if components != table.components {
+            let found = format!("{}, where {} are compressed", components, table.components);
+            let expected = "as many components as the compressed attribute has";
+            return Err(Problem::Illegal { found, expected }.at_json(format!("{at}.type")));
+        }
+        let size = table.component.size() * components;
+        let sparse = sparse(accessor, table.count, size, buffers, &at)?;
+        Ok(Self {
+            count: table.count,
+            components,
+            component: table.component,
+            normalized: accessor.normalized,
+            bytes: Some(Cow::Owned(table.bytes)),
+            stride: size,
+            sparse,
         })
     }
 
@@ -149,6 +186,23 @@ impl<'a> Elements<'a> {
             Component::U8 => self.decode(None, |e| u32::from(e[0])),
             Component::U16 => self.decode(None, |e| u32::from(u16::from_le_bytes(first(e)))),
             _ => self.decode(None, |e| u32::from_le_bytes(first(e))),
+        }
+    }
+
+    /// Elements as vectors of four indices, in the order of `rows`. Components must be unsigned
+    /// integers.
+    pub fn index_quads(&self, rows: Option<&[u32]>) -> Vec<[u32; 4]> {
+        let quad = |element: &[u8], index: fn(&[u8]) -> u32| {
+            let mut parts = element.chunks_exact(self.component.size()).map(index);
+            std::array::from_fn(|_| parts.next().unwrap_or(0))
+        };
+        match self.component {
+            Component::U8 => self.decode(rows, |e| quad(e, |part| part[0].into())),
+            Component::U16 => {
+                let index = |part: &[u8]| u16::from_le_bytes(first(part)).into();
+                self.decode(rows, |e| quad(e, index))
+            }
+            _ => self.decode(rows, |e| quad(e, |part| u32::from_le_bytes(first(part)))),
         }
     }
 
@@ -193,7 +247,7 @@ impl<'a> Elements<'a> {
     fn components<const N: usize, const B: usize>(
         &self,
         rows: Option<&[u32]>,
-        number: impl Fn([u8; B]) -> f32,
+        number: impl Fn([u8; B]) -> f32 + Sync,
     ) -> Vec<[f32; N]> {
         if self.components == N {
             self.decode(rows, |element| {
@@ -209,15 +263,21 @@ impl<'a> Elements<'a> {
     }
 
     /// Decodes each element by `read`, which is given its bytes.
-    fn decode<R: Clone>(&self, rows: Option<&[u32]>, read: impl Fn(&[u8]) -> R) -> Vec<R> {
+    fn decode<R: Clone + Send>(
+        &self,
+        rows: Option<&[u32]>,
+        read: impl Fn(&[u8]) -> R + Sync,
+    ) -> Vec<R> {
         let size = self.component.size() * self.components;
-        let mut elements: Vec<R> = match (self.bytes, rows) {
+        let mut elements: Vec<R> = match (&self.bytes, rows) {
             (Some(bytes), None) => bytes
-                .chunks(self.stride)
-                .map(|e| read(&e[..size]))
+                .par_chunks(self.stride)
+                .with_min_len(ELEMENTS_PER_TASK)
+                .map(|element| read(&element[..size]))
                 .collect(),
             (Some(bytes), Some(rows)) => rows
-                .iter()
+                .par_iter()
+                .with_min_len(ELEMENTS_PER_TASK)
                 .map(|&row| {
                     let start = row as usize * self.stride;
                     read(&bytes[start..start + size])
@@ -225,7 +285,7 @@ impl<'a> Elements<'a> {
                 .collect(),
             (None, _) => {
                 let count = rows.map_or(self.count as usize, <[u32]>::len);
-                vec![read(&[0; 16][..size]); count]
+                vec![read(&[0; LARGEST_ELEMENT][..size]); count]
             }
         };
         if let Some(sparse) = &self.sparse {
@@ -243,9 +303,34 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// The sparse part of an accessor whose elements have `size` bytes.
+/// An accessor, the number of components of its elements, and its path.
+fn accessor_of<'a>(
+    document: &'a Document,
+    index: Index,
+    shapes: &'static str,
+    at: &str,
+) -> Result<(&'a Accessor, usize, String), Fault> {
+    let (index, accessor) = row(&document.accessors, index, "accessor", at)?;
+    let at = format!("accessors[{index}]");
+    if !shapes.split(" or ").any(|shape| shape == accessor.shape) {
+        let found = format!("{:?}", accessor.shape.chars().take(16).collect::<String>());
+        let expected = shapes;
+        return Err(Problem::Illegal { found, expected }.at_json(format!("{at}.type")));
+    }
+    let components = match accessor.shape.as_str() {
+        "SCALAR" => 1,
+        "VEC2" => 2,
+        "VEC3" => 3,
+        "MAT4" => 16,
+        _ => 4,
+    };
+    Ok((accessor, components, at))
+}
+
+/// The sparse part of an accessor that has `count` elements of `size` bytes.
 fn sparse<'a>(
     accessor: &Accessor,
+    count: u64,
     size: usize,
     buffers: &'a Buffers<'_>,
     at: &str,
@@ -279,7 +364,7 @@ fn sparse<'a>(
         }
     };
     let ascends = indices.windows(2).all(|pair| pair[0] < pair[1]);
-    if !ascends || indices.last().is_some_and(|&last| last >= accessor.count) {
+    if !ascends || indices.last().is_some_and(|&last| last >= count) {
         return Err(Problem::Illegal {
             found: "a list that does not ascend or that leaves the accessor".into(),
             expected: "ascending indices below the accessor's count",

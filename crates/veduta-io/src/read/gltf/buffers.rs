@@ -1,6 +1,6 @@
 //! Buffers and files beside: the bytes that accessors and images point into.
 
-use super::document::{BufferView, Document, Index};
+use super::document::{Buffer, BufferView, Document, Index};
 use super::{Fault, Problem, row};
 use crate::read::budget::Budget;
 use crate::read::files::{read_whole, shortened};
@@ -108,6 +108,8 @@ pub struct Buffers<'a> {
     document: &'a Document,
     /// `None` for a buffer that is nowhere, which is an error as soon as it is used.
     bytes: Vec<Option<Bytes<'a>>>,
+    /// For each view, its bytes if it was compressed; empty if none was.
+    decompressed: Vec<Option<Vec<u8>>>,
 }
 
 /// Bytes of a buffer.
@@ -129,12 +131,12 @@ impl<'a> Buffers<'a> {
         let mut all = Vec::with_capacity(document.buffers.len());
         for (index, buffer) in document.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
-                Some(uri) => {
+                Some(uri) if !is_fallback(buffer) => {
                     let at = |problem: Problem| problem.at_json(format!("buffers[{index}].uri"));
                     Some(Bytes::Outside(files.bytes_of(uri, budget).map_err(at)?))
                 }
-                None if index == 0 => bin.map(Bytes::Inside),
-                None => None,
+                None if index == 0 && !is_fallback(buffer) => bin.map(Bytes::Inside),
+                _ => None,
             };
             if let Some(bytes) = &bytes {
                 let present = bytes.as_slice().len() as u64;
@@ -149,21 +151,72 @@ impl<'a> Buffers<'a> {
             }
             all.push(bytes);
         }
-        Ok(Self {
+        let buffers = Self {
             document,
             bytes: all,
-        })
+            decompressed: Vec::new(),
+        };
+        #[cfg(feature = "meshopt")]
+        let buffers = buffers.decompress(budget)?;
+        Ok(buffers)
+    }
+
+    /// Decompresses the views that are compressed.
+    #[cfg(feature = "meshopt")]
+    fn decompress(mut self, budget: &mut Budget) -> Result<Self, Fault> {
+        use super::meshopt::Compressed;
+        use rayon::prelude::*;
+
+        let views = &self.document.buffer_views;
+        if !views.iter().any(|view| view.extensions.meshopt().is_some()) {
+            return Ok(self);
+        }
+        let mut compressed = Vec::with_capacity(views.len());
+        for (index, view) in views.iter().enumerate() {
+            compressed.push(match view.extensions.meshopt() {
+                None => None,
+                Some((name, extension)) => {
+                    let at = format!("bufferViews[{index}].extensions.{name}");
+                    let buffer = self.buffer(extension.buffer, &at)?;
+                    let found = Compressed::find(extension, buffer, budget, &at)?;
+                    Some((found, at))
+                }
+            });
+        }
+        let decompressed: Vec<Result<_, Fault>> = compressed
+            .par_iter()
+            .map(|view| {
+                let Some((view, at)) = view else {
+                    return Ok(None);
+                };
+                view.decompress().map(Some).map_err(|reason| {
+                    let (codec, reason) = ("meshopt", reason.to_owned());
+                    Problem::Compressed { codec, reason }.at_json(at)
+                })
+            })
+            .collect();
+        // One after the other, so that the first error is told however the threads ran.
+        self.decompressed = decompressed.into_iter().collect::<Result<_, _>>()?;
+        Ok(self)
+    }
+
+    /// The bytes of a buffer; `at` is who asks.
+    fn buffer(&self, index: Index, at: &str) -> Result<&[u8], Fault> {
+        let (buffer, _) = row(&self.document.buffers, index, "buffer", at)?;
+        match &self.bytes[buffer] {
+            Some(bytes) => Ok(bytes.as_slice()),
+            None => Err(Problem::NoBinChunk.at_json(format!("buffers[{buffer}]"))),
+        }
     }
 
     /// The bytes of a view; `at` is who asks.
     pub fn view(&self, index: Index, at: &str) -> Result<(&[u8], &'a BufferView), Fault> {
         let (index, view) = row(&self.document.buffer_views, index, "bufferView", at)?;
+        if let Some(Some(bytes)) = self.decompressed.get(index) {
+            return Ok((bytes, view));
+        }
         let at = format!("bufferViews[{index}]");
-        let (buffer, _) = row(&self.document.buffers, view.buffer, "buffer", &at)?;
-        let Some(bytes) = &self.bytes[buffer] else {
-            return Err(Problem::NoBinChunk.at_json(format!("buffers[{buffer}]")));
-        };
-        let bytes = bytes.as_slice();
+        let bytes = self.buffer(view.buffer, &at)?;
         match slice(bytes, view.byte_offset, view.byte_length) {
             Some(bytes) => Ok((bytes, view)),
             None => Err(Problem::Truncated {
@@ -174,6 +227,21 @@ impl<'a> Buffers<'a> {
             .at_json(at)),
         }
     }
+}
+
+/// Whether a buffer is for readers that cannot decompress: it need not exist.
+#[cfg(feature = "meshopt")]
+fn is_fallback(buffer: &Buffer) -> bool {
+    let extensions = &buffer.extensions;
+    let said = [&extensions.meshopt_khr, &extensions.meshopt_ext];
+    said.into_iter()
+        .flatten()
+        .any(|extension| extension.fallback)
+}
+
+#[cfg(not(feature = "meshopt"))]
+fn is_fallback(_: &Buffer) -> bool {
+    false
 }
 
 /// `length` bytes from `offset`, if they are all there.

@@ -5,6 +5,7 @@
 //! are lost in national coordinates) and whose accessors panic on indices out of range.
 
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// Index of a row in one of the document's tables. Not checked; see [`row`](super::row).
 pub type Index = u64;
@@ -40,6 +41,61 @@ pub struct Document {
     pub images: Vec<Image>,
     #[serde(default)]
     pub cameras: Vec<Camera>,
+    #[serde(default)]
+    pub skins: Vec<Skin>,
+    #[serde(default)]
+    pub extensions: DocumentExtensions,
+}
+
+#[derive(Debug, Deserialize, Default)]
+pub struct DocumentExtensions {
+    #[serde(rename = "KHR_lights_punctual")]
+    pub lights: Option<Lights>,
+}
+
+/// KHR_lights_punctual in the document.
+#[derive(Debug, Deserialize)]
+pub struct Lights {
+    #[serde(default)]
+    pub lights: Vec<Light>,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct Light {
+    pub name: Option<String>,
+    #[serde(default = "white")]
+    pub color: [f32; 3],
+    #[serde(default = "one")]
+    pub intensity: f32,
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub range: Option<f32>,
+    #[serde(default)]
+    pub spot: Spot,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub struct Spot {
+    pub inner_cone_angle: f32,
+    pub outer_cone_angle: f32,
+}
+
+impl Default for Spot {
+    fn default() -> Self {
+        Self {
+            inner_cone_angle: 0.0,
+            outer_cone_angle: std::f32::consts::FRAC_PI_4,
+        }
+    }
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
+}
+
+fn one() -> f32 {
+    1.0
 }
 
 #[derive(Debug, Deserialize)]
@@ -69,12 +125,47 @@ pub struct Node {
     /// Quaternion x, y, z, w.
     pub rotation: Option<[f64; 4]>,
     pub scale: Option<[f64; 3]>,
+    /// Shares of the mesh's morph targets, in place of the mesh's own.
+    pub weights: Option<Vec<f32>>,
+    #[serde(default)]
+    pub extensions: NodeExtensions,
+}
+
+#[derive(Debug, Deserialize, Default)]
+pub struct NodeExtensions {
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub instances: Option<Instances>,
+    #[serde(rename = "KHR_lights_punctual")]
+    pub light: Option<LightOfNode>,
+}
+
+/// EXT_mesh_gpu_instancing.
+#[derive(Debug, Deserialize)]
+pub struct Instances {
+    #[serde(default)]
+    pub attributes: Attributes,
+}
+
+/// KHR_lights_punctual in a node.
+#[derive(Debug, Deserialize)]
+pub struct LightOfNode {
+    pub light: Index,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Skin {
+    pub inverse_bind_matrices: Option<Index>,
+    pub joints: Vec<Index>,
 }
 
 #[derive(Debug, Deserialize)]
 pub struct MeshOfPrimitives {
     pub name: Option<String>,
     pub primitives: Vec<Primitive>,
+    /// Shares of the primitives' morph targets.
+    #[serde(default)]
+    pub weights: Vec<f32>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -84,27 +175,34 @@ pub struct Primitive {
     pub material: Option<Index>,
     #[serde(default = "triangles")]
     pub mode: u64,
+    /// Morph targets: what is added to the attributes.
     #[serde(default)]
-    pub targets: Vec<serde::de::IgnoredAny>,
+    pub targets: Vec<Attributes>,
+    #[serde(default)]
+    pub extensions: PrimitiveExtensions,
+}
+
+/// Accessors by the names of attributes, such as `POSITION` and `TEXCOORD_0`.
+pub type Attributes = BTreeMap<String, Index>;
+
+#[derive(Debug, Deserialize, Default)]
+pub struct PrimitiveExtensions {
+    #[serde(rename = "KHR_draco_mesh_compression")]
+    pub draco: Option<Draco>,
+}
+
+/// KHR_draco_mesh_compression.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Draco {
+    pub buffer_view: Index,
+    /// Numbers of attributes within the compressed mesh, not of accessors.
+    pub attributes: Attributes,
 }
 
 /// `Primitive::mode` of separate triangles, the default.
 fn triangles() -> u64 {
     4
-}
-
-/// Accessors of the vertices' attributes.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
-pub struct Attributes {
-    pub position: Option<Index>,
-    pub normal: Option<Index>,
-    #[serde(rename = "TEXCOORD_0")]
-    pub texcoord_0: Option<Index>,
-    #[serde(rename = "TEXCOORD_1")]
-    pub texcoord_1: Option<Index>,
-    #[serde(rename = "COLOR_0")]
-    pub color_0: Option<Index>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -154,6 +252,44 @@ pub struct BufferView {
     pub byte_offset: u64,
     pub byte_length: u64,
     pub byte_stride: Option<u64>,
+    #[cfg(feature = "meshopt")]
+    #[serde(default)]
+    pub extensions: BufferViewExtensions,
+}
+
+#[cfg(feature = "meshopt")]
+#[derive(Debug, Deserialize, Default)]
+pub struct BufferViewExtensions {
+    #[serde(rename = "KHR_meshopt_compression")]
+    meshopt_khr: Option<Meshopt>,
+    #[serde(rename = "EXT_meshopt_compression")]
+    meshopt_ext: Option<Meshopt>,
+}
+
+#[cfg(feature = "meshopt")]
+impl BufferViewExtensions {
+    /// How the view is compressed, and the name of the extension that says so.
+    pub fn meshopt(&self) -> Option<(&'static str, &Meshopt)> {
+        let khr = self.meshopt_khr.as_ref();
+        let ext = self.meshopt_ext.as_ref();
+        khr.map(|row| ("KHR_meshopt_compression", row))
+            .or(ext.map(|row| ("EXT_meshopt_compression", row)))
+    }
+}
+
+/// KHR_meshopt_compression, or EXT_meshopt_compression, of which it is an extension.
+#[cfg(feature = "meshopt")]
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Meshopt {
+    pub buffer: Index,
+    #[serde(default)]
+    pub byte_offset: u64,
+    pub byte_length: u64,
+    pub byte_stride: u64,
+    pub count: u64,
+    pub mode: String,
+    pub filter: Option<String>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -161,6 +297,27 @@ pub struct BufferView {
 pub struct Buffer {
     pub uri: Option<String>,
     pub byte_length: u64,
+    #[cfg(feature = "meshopt")]
+    #[serde(default)]
+    pub extensions: BufferExtensions,
+}
+
+#[cfg(feature = "meshopt")]
+#[derive(Debug, Deserialize, Default)]
+pub struct BufferExtensions {
+    #[serde(rename = "KHR_meshopt_compression")]
+    pub meshopt_khr: Option<MeshoptBuffer>,
+    #[serde(rename = "EXT_meshopt_compression")]
+    pub meshopt_ext: Option<MeshoptBuffer>,
+}
+
+/// What KHR_meshopt_compression says of a buffer.
+#[cfg(feature = "meshopt")]
+#[derive(Debug, Deserialize)]
+pub struct MeshoptBuffer {
+    /// The buffer is for readers that cannot decompress, and need not exist.
+    #[serde(default)]
+    pub fallback: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -170,7 +327,7 @@ pub struct Material {
     pub name: String,
     #[serde(default)]
     pub pbr_metallic_roughness: Pbr,
-    pub emissive_texture: Option<serde::de::IgnoredAny>,
+    pub emissive_texture: Option<TextureInfo>,
     #[serde(default)]
     pub emissive_factor: [f32; 3],
     pub alpha_mode: Option<String>,
@@ -257,6 +414,20 @@ fn unscaled() -> [f32; 2] {
 pub struct Texture {
     pub source: Option<Index>,
     pub sampler: Option<Index>,
+    #[serde(default)]
+    pub extensions: TextureSources,
+}
+
+/// Images that take the place of a texture's own.
+#[derive(Debug, Deserialize, Default)]
+pub struct TextureSources {
+    #[serde(rename = "EXT_texture_webp")]
+    pub webp: Option<TextureSource>,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct TextureSource {
+    pub source: Option<Index>,
 }
 
 #[derive(Debug, Deserialize)]

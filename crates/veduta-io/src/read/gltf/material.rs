@@ -1,7 +1,7 @@
 //! Materials and textures.
 //!
 //! glTF 2.0, §3.8 and §3.9: base colour, opacity and emission are kept; metal and roughness, and
-//! the maps of normals, occlusion and emission, are not.
+//! the maps of normals and occlusion, are not.
 
 use super::buffers::{Buffers, Files};
 use super::document::{self, Document, TextureInfo};
@@ -9,7 +9,7 @@ use super::{Fault, Problem, row};
 use crate::read::budget::Budget;
 use crate::read::error::{Place, Warnings};
 use crate::read::picture::PictureDecoder;
-use veduta::scene::{AlphaMode, Image, ImageId, Material, TextureRef, Wrap};
+use veduta::scene::{AlphaMode, Image, ImageId, Material, TexcoordSet, TextureRef, Wrap};
 use veduta_geometry::Vec2;
 
 /// The texture of a material's colour.
@@ -17,6 +17,38 @@ pub fn color_texture(material: &document::Material) -> Option<&TextureInfo> {
     match &material.extensions.specular_glossiness {
         Some(older) => older.diffuse_texture.as_ref(),
         None => material.pbr_metallic_roughness.base_color_texture.as_ref(),
+    }
+}
+
+/// The texture of a material's emission, unless nothing is emitted.
+fn emissive_texture(material: &document::Material) -> Option<&TextureInfo> {
+    let emits = material.emissive_factor != [0.0; 3];
+    material.emissive_texture.as_ref().filter(|_| emits)
+}
+
+/// Which of a primitive's sets of texture coordinates become the tables of the mesh.
+///
+/// A file may have any number of sets; a material's two textures ask for two at most. So each
+/// material has its own numbering: the first table is the set of its colour, the second that of its
+/// emission if it is another one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TexcoordSets {
+    pub first: u64,
+    /// Whether a texture asks for the first; otherwise it is kept if it is there.
+    pub first_is_used: bool,
+    pub second: Option<u64>,
+}
+
+impl TexcoordSets {
+    pub fn of(material: &document::Material) -> Self {
+        let color = color_texture(material).map(TextureInfo::texcoord_set);
+        let emission = emissive_texture(material).map(TextureInfo::texcoord_set);
+        let first = color.or(emission);
+        Self {
+            first: first.unwrap_or(0),
+            first_is_used: first.is_some(),
+            second: emission.filter(|_| emission != first),
+        }
     }
 }
 
@@ -59,20 +91,20 @@ impl MaterialReader<'_> {
             Some(older) => older.diffuse_factor,
             None => material.pbr_metallic_roughness.base_color_factor,
         };
-        let base_color_texture = match color_texture(material) {
-            Some(texture) if used => self.texture(texture, &at)?,
-            _ => None,
+        let sets = TexcoordSets::of(material);
+        let mut texture = |info: Option<&TextureInfo>| match info {
+            Some(info) if used => self.texture(info, &sets, &at),
+            _ => Ok(None),
         };
+        let base_color_texture = texture(color_texture(material))?;
+        let emissive_info = emissive_texture(material);
+        let emissive_texture = texture(emissive_info)?;
         let strength = extensions.emissive_strength.as_ref();
         let strength = strength.and_then(|e| e.emissive_strength).unwrap_or(1.0);
         let mut emissive = material.emissive_factor.map(|factor| factor * strength);
-        if material.emissive_texture.is_some() && emissive != [0.0; 3] {
-            // Without its map, emission would cover the whole surface instead of a lamp on it.
+        if emissive_info.is_some() && emissive_texture.is_none() {
+            // Without its picture, emission would cover the whole surface instead of a lamp on it.
             emissive = [0.0; 3];
-            if used {
-                let message = "emissive textures are not supported; nothing is emitted";
-                self.warnings.add(Place::Json(at.clone()), message);
-            }
         }
         let base_color = factor.unwrap_or([1.0; 4]);
         for (field, values) in [("colour", &base_color[..]), ("emission", &emissive[..])] {
@@ -90,6 +122,7 @@ impl MaterialReader<'_> {
             base_color,
             base_color_texture,
             emissive,
+            emissive_texture,
             alpha_mode: match material.alpha_mode.as_deref() {
                 None | Some("OPAQUE") => AlphaMode::Opaque,
                 Some("MASK") => AlphaMode::Mask(material.alpha_cutoff.unwrap_or(0.5)),
@@ -107,11 +140,17 @@ impl MaterialReader<'_> {
     }
 
     /// The picture a texture lays on a surface; `None`, with a warning, if it cannot be had.
-    fn texture(&mut self, info: &TextureInfo, at: &str) -> Result<Option<TextureRef>, Fault> {
+    fn texture(
+        &mut self,
+        info: &TextureInfo,
+        sets: &TexcoordSets,
+        at: &str,
+    ) -> Result<Option<TextureRef>, Fault> {
         let (index, texture) = row(&self.document.textures, info.index, "texture", at)?;
         let at = format!("textures[{index}]");
-        let Some(source) = texture.source else {
-            let message = "has no PNG or JPEG image; the plain colour is shown";
+        let webp = texture.extensions.webp.as_ref();
+        let Some(source) = webp.and_then(|webp| webp.source).or(texture.source) else {
+            let message = "has no PNG, JPEG or WebP image; it is left out";
             self.warnings.add(Place::Json(at), message);
             return Ok(None);
         };
@@ -127,6 +166,9 @@ impl MaterialReader<'_> {
             return Ok(None);
         };
         let mut texture_ref = TextureRef::new(image);
+        if sets.second == Some(info.texcoord_set()) {
+            texture_ref.texcoords = TexcoordSet::Second;
+        }
         if let Some(sampler) = texture.sampler {
             let (_, sampler) = row(&self.document.samplers, sampler, "sampler", &at)?;
             texture_ref.wrap = [sampler.wrap_s, sampler.wrap_t].map(|wrap| match wrap {
@@ -169,7 +211,7 @@ impl MaterialReader<'_> {
                 Ok(Some(ImageId(self.images.len() as u32 - 1)))
             }
             Err(message) => {
-                let message = format!("{message}; the plain colour is shown");
+                let message = format!("{message}; textures of it are left out");
                 self.warnings.add(Place::Json(at), message);
                 Ok(None)
             }

@@ -1,6 +1,6 @@
 //! The node tree: which node stands where, and what it is called.
 
-use super::document::{Document, Node};
+use super::document::{Document, Index, Node};
 use super::{Fault, Problem, row};
 use crate::read::budget::Budget;
 use crate::read::names::unique;
@@ -11,6 +11,8 @@ use veduta_geometry::{DMat3, DMat4, DQuat, DVec3, DVec4};
 pub struct Tree {
     /// In tree order: each node before its children.
     pub placed: Vec<Placed>,
+    /// For each node of the document: its row in `placed`.
+    places: Vec<Option<u32>>,
     /// For each node of the document: its parent.
     parents: Vec<Option<usize>>,
     /// For each node of the document: a name that no sibling has.
@@ -36,6 +38,7 @@ impl Tree {
         let mut labels = vec![String::new(); nodes.len()];
         label_siblings(document, roots.iter().copied(), &mut labels, budget)?;
         let mut placed = Vec::new();
+        let mut places = vec![None; nodes.len()];
         let mut waiting: Vec<(usize, DMat4)> = roots
             .iter()
             .rev()
@@ -43,6 +46,7 @@ impl Tree {
             .collect();
         while let Some((node, world_from_parent)) = waiting.pop() {
             let world_from_node = world_from_parent * local_transform(node, &nodes[node])?;
+            places[node] = Some(placed.len() as u32);
             placed.push(Placed {
                 node,
                 world_from_node,
@@ -53,9 +57,23 @@ impl Tree {
         }
         Ok(Self {
             placed,
+            places,
             parents,
             labels,
         })
+    }
+
+    /// Where a node stands; `None` if the scene does not show it.
+    pub fn world_from(&self, node: usize) -> Option<DMat4> {
+        let place = self.places[node]?;
+        Some(self.placed[place as usize].world_from_node)
+    }
+
+    /// The names of a node's children, as [`unique`] wants them.
+    pub fn children_of(&self, document: &Document, node: usize) -> HashMap<String, u32> {
+        let children = document.nodes[node].children.iter();
+        let label = |&child: &Index| (self.labels[child as usize].clone(), 1);
+        children.map(label).collect()
     }
 
     /// The names from the root to `node`, joined by `/`; unique in the scene.

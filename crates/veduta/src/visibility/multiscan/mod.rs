@@ -101,6 +101,14 @@ impl Spans {
         self.bands[band].sub_scanline(index)
     }
 
+    /// The faces seen, ascending.
+    pub fn faces(&self) -> Vec<FaceId> {
+        let mut faces: Vec<FaceId> = self.bands.iter().flat_map(Band::faces).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        faces
+    }
+
     /// Number of spans.
     pub fn len(&self) -> usize {
         self.bands.iter().map(Band::len).sum()

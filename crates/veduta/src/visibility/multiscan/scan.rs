@@ -29,6 +29,12 @@ impl Band {
         &self.spans[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 
+    /// The faces of its spans, of neighbours once.
+    pub(super) fn faces(&self) -> impl Iterator<Item = FaceId> {
+        let runs = self.spans.chunk_by(|a, b| a.face == b.face);
+        runs.map(|spans| spans[0].face)
+    }
+
     pub(super) fn len(&self) -> usize {
         self.spans.len()
     }

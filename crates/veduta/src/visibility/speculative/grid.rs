@@ -13,9 +13,9 @@ pub(super) struct Extent {
     pub nearness: [f32; 2],
 }
 
-/// Added to both sides of a bound that is rounded to f32: more than half a unit in the last place
-/// of any number in the frame. A larger one would only cost time.
-const COORDINATE_MARGIN: f32 = 1.2e-7;
+/// Added to both sides of a bound that is rounded to f32: more than what rounding does to it, to the
+/// top of the grid and to their difference in the frame. A larger one would only cost time.
+const COORDINATE_MARGIN: f32 = 2.5e-7;
 /// The same for nearness, relative to its size.
 const NEARNESS_MARGIN: f64 = 2e-7;
 
@@ -58,11 +58,15 @@ impl Extent {
     }
 }
 
-/// A regular grid of cells over the frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A regular grid of cells over a strip of the frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
     pub columns: u32,
     pub rows: u32,
+    /// The strip's top in the image plane.
+    pub top: f64,
+    /// The strip's height.
+    pub height: f64,
 }
 
 /// Cells a face may touch: all of a box of cells.
@@ -90,18 +94,34 @@ impl Grid {
         row as usize * self.columns as usize + column as usize
     }
 
+    /// The grid's top left corner in the image plane.
+    pub fn origin(&self) -> DVec2 {
+        DVec2::new(0.0, self.top)
+    }
+
     /// Scale from the image plane to cells.
     pub fn scale(&self) -> DVec2 {
-        DVec2::new(f64::from(self.columns), f64::from(self.rows))
+        DVec2::new(f64::from(self.columns), f64::from(self.rows) / self.height)
+    }
+
+    /// A plane over the image plane as a function of places on the grid, where cells have unit size.
+    pub fn plane(&self, plane: &Affine) -> Affine {
+        let scale = self.scale();
+        Affine::new(
+            plane.a / scale.x,
+            plane.b / scale.y,
+            plane.c + plane.b * self.top,
+        )
     }
 
     /// The box of cells that an extent touches.
     #[inline]
     pub fn span(&self, extent: &Extent) -> Span {
         let cell = |value: f32, cells: u32| ((value * cells as f32) as u32).min(cells - 1);
+        let (top, height) = (self.top as f32, self.height as f32);
         Span {
             columns: extent.x.map(|x| cell(x, self.columns)),
-            rows: extent.y.map(|y| cell(y, self.rows)),
+            rows: extent.y.map(|y| cell((y - top) / height, self.rows)),
         }
     }
 
@@ -137,9 +157,9 @@ impl Grid {
 
     /// Smallest and largest x of the outline within a row of cells.
     fn reach_in_row(&self, outline: &[DVec2], row: u32) -> (f64, f64) {
-        let height = 1.0 / f64::from(self.rows);
-        let top = f64::from(row) * height - ROW_MARGIN;
-        let bottom = f64::from(row + 1) * height + ROW_MARGIN;
+        let height = self.height / f64::from(self.rows);
+        let top = self.top + f64::from(row) * height - ROW_MARGIN;
+        let bottom = self.top + f64::from(row + 1) * height + ROW_MARGIN;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut previous = outline[outline.len() - 1];
         for &next in outline {
@@ -172,10 +192,10 @@ impl Grid {
     #[inline]
     pub fn upper_bound(&self, plane: &Affine, column: u32, row: u32) -> f64 {
         let corner = DVec2::new(
-            f64::from(column + u32::from(plane.a > 0.0)) / f64::from(self.columns),
-            f64::from(row + u32::from(plane.b > 0.0)) / f64::from(self.rows),
+            f64::from(column + u32::from(plane.a > 0.0)),
+            f64::from(row + u32::from(plane.b > 0.0)),
         );
-        plane.at(corner)
+        plane.at(corner / self.scale() + self.origin())
     }
 }
 

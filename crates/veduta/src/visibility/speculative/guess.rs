@@ -28,9 +28,14 @@ pub(super) fn thresholds(faces: &Faces, extents: &[Extent], grid: &Grid, samples
         .into_par_iter()
         .map(|band| {
             let rows = rows_of(band);
+            let samples_grid = Grid {
+                columns: grid.columns * samples,
+                rows: grid.rows * samples,
+                ..*grid
+            };
             let first = (rows.start * samples).saturating_sub(1);
-            let last = (rows.end * samples + 1).min(grid.rows * samples);
-            let mut buffer = ZBuffer::new(grid.columns * samples, grid.rows * samples, first..last);
+            let last = (rows.end * samples + 1).min(samples_grid.rows);
+            let mut buffer = ZBuffer::new(samples_grid, first..last);
             for (index, extent) in extents.iter().enumerate() {
                 let face = FaceId(index as u32);
                 if buffer.reaches(extent) && !faces.is_veil(face) {
@@ -43,40 +48,44 @@ pub(super) fn thresholds(faces: &Faces, extents: &[Extent], grid: &Grid, samples
     parts.concat()
 }
 
-/// Samples of some rows of the frame, each with the greatest nearness found there.
+/// Samples of some rows, each with the greatest nearness found there.
 struct ZBuffer {
     width: usize,
     rows: std::ops::Range<usize>,
-    /// Size of a sample in the image plane.
-    pixel: DVec2,
+    /// Each cell has a sample in its middle.
+    grid: Grid,
+    scale: DVec2,
     samples: Vec<f32>,
 }
 
 impl ZBuffer {
-    fn new(width: u32, height: u32, rows: std::ops::Range<u32>) -> Self {
+    fn new(grid: Grid, rows: std::ops::Range<u32>) -> Self {
         Self {
-            width: width as usize,
+            width: grid.columns as usize,
             rows: rows.start as usize..rows.end as usize,
-            pixel: DVec2::new(1.0 / f64::from(width), 1.0 / f64::from(height)),
-            samples: vec![OPEN; width as usize * (rows.end - rows.start) as usize],
+            grid,
+            scale: grid.scale(),
+            samples: vec![OPEN; grid.columns as usize * (rows.end - rows.start) as usize],
         }
     }
 
     /// Whether a face of this extent can hold a sample of these rows.
     #[inline]
     fn reaches(&self, extent: &Extent) -> bool {
-        let pixel = self.pixel.y as f32;
-        let first = (extent.y[0] / pixel + 0.5) as usize;
-        let last = (extent.y[1] / pixel + 0.5) as usize;
+        let (top, scale) = (self.grid.top as f32, self.scale.y as f32);
+        let first = ((extent.y[0] - top) * scale + 0.5) as usize;
+        let last = ((extent.y[1] - top) * scale + 0.5) as usize;
         first < last && first < self.rows.end && last > self.rows.start
     }
 
     /// Draws a convex outline as a fan of triangles.
     fn draw(&mut self, outline: &[DVec2], plane: &Affine) {
-        let plane = Affine::new(plane.a * self.pixel.x, plane.b * self.pixel.y, plane.c);
-        let first = outline[0] / self.pixel;
+        let plane = self.grid.plane(plane);
+        let (origin, scale) = (self.grid.origin(), self.scale);
+        let place = |point: DVec2| (point - origin) * scale;
+        let first = place(outline[0]);
         for edge in outline[1..].windows(2) {
-            self.draw_triangle([first, edge[0] / self.pixel, edge[1] / self.pixel], &plane);
+            self.draw_triangle([first, place(edge[0]), place(edge[1])], &plane);
         }
     }
 

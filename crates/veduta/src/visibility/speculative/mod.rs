@@ -27,11 +27,13 @@ mod sides;
 mod verify;
 
 use super::Seen;
+use crate::buckets::Buckets;
 use cells::{CellLists, listed_between};
 use clip::{Clipper, Context};
 use found::{Found, Pile};
 use grid::{Extent, Grid};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::sync::Mutex;
 use veduta_map::{FaceId, Faces};
 use verify::{Scratch, Verification};
@@ -43,6 +45,8 @@ pub struct Settings {
     pub guess: bool,
     /// Width over height of the frame, so that cells are about square.
     pub aspect: f64,
+    /// Top and bottom of the strip of the frame in which all faces lie: 0 and 1 for all of it.
+    pub strip: [f64; 2],
     /// Number of cells, about; by default one for each few faces.
     pub cells: Option<u32>,
 }
@@ -52,6 +56,7 @@ impl Default for Settings {
         Self {
             guess: true,
             aspect: 1.5,
+            strip: [0.0, 1.0],
             cells: None,
         }
     }
@@ -151,11 +156,18 @@ fn choose_grid(faces: usize, settings: &Settings) -> Grid {
         || (faces as f64 / FACES_PER_CELL).clamp(1024.0, 1024.0 * 1024.0),
         |cells| f64::from(cells.max(1)),
     );
-    let columns = (cells * settings.aspect).sqrt().round().clamp(1.0, 16384.0);
+    let [top, bottom] = settings.strip;
+    let height = bottom - top;
+    let columns = (cells * settings.aspect / height)
+        .sqrt()
+        .round()
+        .clamp(1.0, 16384.0);
     let rows = (cells / columns).round().clamp(1.0, 16384.0);
     Grid {
         columns: columns as u32,
         rows: rows as u32,
+        top,
+        height,
     }
 }
 
@@ -173,22 +185,15 @@ impl Report {
 fn by_place(context: &Context, candidates: &[FaceId]) -> Vec<FaceId> {
     let cell_of = |face: FaceId| {
         let span = context.grid.span(&context.extents[face.index()]);
-        context.grid.index(span.columns[0], span.rows[0])
+        context.grid.index(span.columns[0], span.rows[0]) as u32
     };
-    let mut next = vec![0_u32; context.grid.cells() + 1];
-    for &face in candidates {
-        next[cell_of(face) + 1] += 1;
-    }
-    for cell in 1..next.len() {
-        next[cell] += next[cell - 1];
-    }
-    let mut in_order = vec![FaceId(0); candidates.len()];
-    for &face in candidates {
-        let place = &mut next[cell_of(face)];
-        in_order[*place as usize] = face;
-        *place += 1;
-    }
-    in_order
+    let cells: Vec<Range<u32>> = candidates
+        .iter()
+        .map(|&face| cell_of(face)..cell_of(face) + 1)
+        .collect();
+    let sorted = Buckets::new(context.grid.cells(), &cells);
+    let in_order = (0..sorted.len()).flat_map(|cell| sorted.of(cell));
+    in_order.map(|&index| candidates[index as usize]).collect()
 }
 
 /// Where what is clipped is measured, to prove the guess.

@@ -75,16 +75,15 @@ impl Verification {
         wanted: impl Fn(usize) -> bool,
     ) {
         let grid = context.grid;
-        let scale = grid.scale();
+        let (origin, scale) = (grid.origin(), grid.scale());
         let Scratch {
             areas,
             polygon: scaled,
             clipped,
         } = scratch;
         scaled.clear();
-        scaled.extend(polygon.map(|point| point * scale));
-        // The plane over the grid, where cells have unit size.
-        let plane = Affine::new(plane.a / scale.x, plane.b / scale.y, plane.c);
+        scaled.extend(polygon.map(|point| (point - origin) * scale));
+        let plane = grid.plane(plane);
         let (mut min, mut max, mut lowest) = (scaled[0], scaled[0], plane.at(scaled[0]));
         for &point in &scaled[1..] {
             min = min.min(point);
