@@ -1,12 +1,14 @@
 //! How the command ends: what each exit code means, and the one way to fail.
 
 use std::fmt;
-use veduta_io::{ErrorKind, ReadError, WriteError, WriteProblem};
+use veduta_io::{ErrorKind, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem};
 
 /// Exit codes. `0` is success, `130` an interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Code {
+    /// What was checked is not as it should be.
+    CheckFailed = 1,
     /// The command line asks for something that makes no sense.
     Usage = 2,
     /// Something that is named is missing.
@@ -19,8 +21,17 @@ pub enum Code {
     InputOutput = 6,
     /// A fault of the program itself (`EX_SOFTWARE` of sysexits.h).
     Internal = 70,
-    /// The user interrupted it (128 + SIGINT).
+    /// The user, or the system, interrupted it (128 + SIGINT; the same for SIGTERM and SIGHUP).
     Interrupted = 130,
+}
+
+/// How a verb that did its work ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// As it should.
+    Fine,
+    /// With what was checked not as it should be, which has been told.
+    CheckFailed,
 }
 
 /// Why a verb failed, in a sentence.
@@ -60,8 +71,22 @@ impl From<ReadError> for Failure {
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         let code = match error.problem {
-            WriteProblem::UnknownSuffix(_) => Code::Usage,
+            WriteProblem::UnknownSuffix(_)
+            | WriteProblem::UnknownModelSuffix(_)
+            | WriteProblem::NoSuchSamples { .. } => Code::Usage,
+            WriteProblem::Model(_) => Code::Unsupported,
             _ => Code::InputOutput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<ReadPictureError> for Failure {
+    fn from(error: ReadPictureError) -> Self {
+        let code = match error.problem {
+            PictureProblem::Unreadable(_) => Code::InputOutput,
+            PictureProblem::UnknownFormat(_) | PictureProblem::Unsupported(_) => Code::Unsupported,
+            _ => Code::BadInput,
         };
         Self::new(code, error.to_string())
     }

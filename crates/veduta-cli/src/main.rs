@@ -3,12 +3,13 @@
 //! A file for each verb, in `verb/`. Data goes to stdout, talk to stderr; how it ends is in `exit`.
 
 mod exit;
+mod preview;
 mod talk;
 mod values;
 mod verb;
 
-use clap::{Args, Parser, Subcommand};
-use exit::{Code, Failure};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use exit::{Code, Ending, Failure};
 use std::num::NonZeroUsize;
 use std::panic::{self, AssertUnwindSafe};
 use std::process::ExitCode;
@@ -16,7 +17,13 @@ use talk::{ProgressStyle, Talk, say_error};
 
 /// Pictures of 3D scenes with exactly antialiased edges.
 #[derive(Debug, Parser)]
-#[command(name = "veduta", version, arg_required_else_help = true, after_help = EXIT_CODES)]
+#[command(
+    name = "veduta",
+    version,
+    arg_required_else_help = true,
+    after_help = EXIT_CODES,
+    after_long_help = format!("{EXAMPLES}\n{EXIT_CODES}"),
+)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
@@ -24,8 +31,18 @@ struct Arguments {
     common: Common,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 fine, 2 usage, 3 something named is missing, 4 bad input, \
-    5 not supported, 6 input/output, 70 a fault of veduta itself, 130 interrupted.";
+const EXAMPLES: &str = "\
+Examples:
+      veduta examples river
+      veduta render river.glb --preview=blocks
+      veduta render river.glb -o river.png
+      veduta info river.glb
+      veduta help render
+";
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 fine, 1 a check failed or pictures differ, 2 usage, 3 something named is missing, 4 bad \
+    input, 5 not supported, 6 input/output, 70 a fault of veduta itself, 130 interrupted.";
 
 /// What all verbs understand.
 #[derive(Debug, Args)]
@@ -46,6 +63,9 @@ struct Common {
         hide_default_value = true
     )]
     progress: ProgressStyle,
+    /// Replace files that exist; pictures are always replaced
+    #[arg(long, global = true)]
+    force: bool,
     /// No warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
@@ -57,12 +77,17 @@ struct Common {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Render(Box<verb::render::Render>),
-    Info(verb::info::Info),
+    Info(Box<verb::info::Info>),
+    Check(verb::check::Check),
+    Diff(verb::diff::Diff),
+    Examples(verb::examples::Examples),
+    Completions(verb::completions::Completions),
+    Man(verb::man::Man),
 }
 
 fn main() -> ExitCode {
     set_panic_message();
-    // Partial output is removed on Ctrl-C. Without the handler the files would stay; not having it
+    // Partial output is removed on SIGINT, SIGTERM and SIGHUP. Without the handler the files would stay; not having it
     // is no reason not to work.
     let _ = ctrlc::set_handler(|| {
         veduta_io::remove_unfinished();
@@ -76,7 +101,7 @@ fn main() -> ExitCode {
         }
         // Help or version were asked for.
         Err(text) => {
-            return end(talk::print(&text.render().to_string()));
+            return end(talk::print(&text.render().to_string()).map(|()| Ending::Fine));
         }
     };
     match panic::catch_unwind(AssertUnwindSafe(|| run(arguments))) {
@@ -86,7 +111,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: Arguments) -> Result<(), Failure> {
+fn run(arguments: Arguments) -> Result<Ending, Failure> {
     let common = &arguments.common;
     if let Some(threads) = common.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get());
@@ -94,15 +119,22 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         started.map_err(|error| Failure::new(Code::InputOutput, format!("threads: {error}")))?;
     }
     let mut talk = Talk::new(common.quiet, common.verbose, common.progress);
+    let fine = |()| Ending::Fine;
     match &arguments.verb {
-        Verb::Render(render) => render.run(common.json, &mut talk),
-        Verb::Info(info) => info.run(common.json, &mut talk),
+        Verb::Render(render) => render.run(common.json, &mut talk).map(fine),
+        Verb::Info(info) => info.run(common.json, &mut talk).map(fine),
+        Verb::Check(check) => check.run(common.json, &mut talk),
+        Verb::Diff(diff) => diff.run(common.json, &mut talk),
+        Verb::Examples(examples) => examples.run(common, &mut talk).map(fine),
+        Verb::Completions(completions) => completions.run(&mut Arguments::command()).map(fine),
+        Verb::Man(man) => man.run(Arguments::command(), common.force).map(fine),
     }
 }
 
-fn end(result: Result<(), Failure>) -> ExitCode {
+fn end(result: Result<Ending, Failure>) -> ExitCode {
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Ending::Fine) => ExitCode::SUCCESS,
+        Ok(Ending::CheckFailed) => ExitCode::from(Code::CheckFailed as u8),
         Err(failure) => {
             say_error(&failure);
             ExitCode::from(failure.code as u8)

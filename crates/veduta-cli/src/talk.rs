@@ -2,6 +2,7 @@
 
 use crate::exit::{Code, Failure};
 use clap::ValueEnum;
+use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
 use std::time::Instant;
 
@@ -25,7 +26,7 @@ pub struct Talk {
     quiet: bool,
     verbose: bool,
     style: ProgressStyle,
-    step: Option<(&'static str, Instant)>,
+    step: Option<(Cow<'static, str>, Instant)>,
     warnings: Vec<String>,
 }
 
@@ -46,8 +47,9 @@ impl Talk {
     }
 
     /// Says that a step begins, and the one before it is done.
-    pub fn begin(&mut self, step: &'static str) {
+    pub fn begin(&mut self, step: impl Into<Cow<'static, str>>) {
         self.end();
+        let step = step.into();
         match self.style {
             ProgressStyle::Bar => say(format_args!("\r\x1b[2Kveduta: {step} …")),
             ProgressStyle::Json => {
@@ -59,6 +61,24 @@ impl Talk {
             ProgressStyle::Auto | ProgressStyle::None => {}
         }
         self.step = Some((step, Instant::now()));
+    }
+
+    /// Says that `done` of `count` parts of the current step are done.
+    pub fn part(&mut self, done: usize, count: usize) {
+        let Some((step, _)) = &self.step else {
+            return;
+        };
+        match self.style {
+            ProgressStyle::Bar => {
+                let percent = 100 * done / count.max(1);
+                say(format_args!("\r\x1b[2Kveduta: {step} … {percent} %"));
+            }
+            ProgressStyle::Json => {
+                let line = serde_json::json!({ "step": step, "done": false, "part": done, "parts": count });
+                say(format_args!("{line}\n"));
+            }
+            ProgressStyle::Auto | ProgressStyle::None => {}
+        }
     }
 
     /// Says that the current step is done.
@@ -97,6 +117,11 @@ impl Talk {
         }
     }
 
+    /// Whether only what was asked for is said.
+    pub fn is_quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// All warnings so far.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
@@ -128,14 +153,47 @@ pub fn say_error(message: impl std::fmt::Display) {
 
 /// Writes data to stdout.
 pub fn print(text: &str) -> Result<(), Failure> {
+    print_bytes(text.as_bytes())
+}
+
+/// Writes data to stdout.
+pub fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut stdout = io::stdout().lock();
-    match stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush())
-    {
+    match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
         Ok(()) => Ok(()),
         // Who reads has read enough: `veduta info … | head`.
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Failure::new(Code::InputOutput, format!("stdout: {error}"))),
     }
+}
+
+/// A number with its thousands set apart.
+pub fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut grouped = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            grouped.push(',');
+        }
+        grouped.push(digit);
+    }
+    grouped
+}
+
+/// A number of things of that name: `1 face`, `2,000 faces`.
+pub fn counted(number: usize, name: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{} {name}{plural}", grouped(number))
+}
+
+/// A name from a file, for a terminal: control characters, which could move its cursor or worse, are
+/// shown as escapes.
+pub fn plain(name: &str) -> String {
+    name.chars()
+        .flat_map(|c| {
+            let escaped = c.is_control().then(|| c.escape_default());
+            let kept = escaped.is_none().then_some(c);
+            escaped.into_iter().flatten().chain(kept)
+        })
+        .collect()
 }

@@ -1,8 +1,10 @@
 //! Values of the command line, with their units.
 
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use veduta::pipeline::Sampling;
 use veduta_geometry::DVec3;
+use veduta_io::PictureFormat;
 use veduta_io::tone::{Exposure, linear_from_srgb};
 
 /// Size of a picture in pixels.
@@ -92,23 +94,29 @@ pub fn length(text: &str) -> Result<f64, String> {
 }
 
 /// Background of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Background {
     /// Transparent.
     None,
     /// Linear Rec.709.
     Color([f32; 3]),
+    /// The picture in this file.
+    Picture(PathBuf),
 }
 
 impl FromStr for Background {
     type Err = String;
 
-    /// `none`, `#rgb` or `#rrggbb`, sRGB.
+    /// `none`, `#rgb` or `#rrggbb` (sRGB), or a file with the suffix of a picture.
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "none" {
             return Ok(Self::None);
         }
-        let expected = || "expected none or a colour such as #8ab4d8".to_owned();
+        if PictureFormat::of(Path::new(text)).is_ok() {
+            return Ok(Self::Picture(PathBuf::from(text)));
+        }
+        let expected =
+            || "expected none, a colour such as #8ab4d8, or a picture such as sky.jpg".to_owned();
         let digits = text.strip_prefix('#').ok_or_else(expected)?;
         let digits: Option<Vec<u32>> = digits.chars().map(|digit| digit.to_digit(16)).collect();
         let bytes = match digits.as_deref() {
@@ -206,6 +214,8 @@ mod tests {
         assert!((color[1] - 0.2159).abs() < 1e-4);
         assert_eq!("#f80".parse::<Background>(), "#ff8800".parse());
         assert_eq!("none".parse(), Ok(Background::None));
+        let picture = Background::Picture("my sky.JPG".into());
+        assert_eq!("my sky.JPG".parse(), Ok(picture));
         for text in ["ff8000", "#ff80", "#gg0000", "red", "#ff80000", "#é00"] {
             assert!(text.parse::<Background>().is_err(), "{text}");
         }

@@ -15,6 +15,8 @@
     feature = "cityjson"
 ))]
 mod read;
+mod read_picture;
+mod scale;
 pub mod tone;
 mod write;
 
@@ -31,7 +33,10 @@ pub use read::{
 };
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};
+pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
+pub use scale::scaled;
 pub use write::{
-    PICTURE_SUFFIXES, PictureFormat, PictureOptions, PngDepth, WriteError, WriteProblem,
-    remove_unfinished, write_picture,
+    ExrCompression, MODEL_SUFFIXES, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples,
+    WriteError, WriteProblem, remove_unfinished, stream_picture, write_model, write_picture,
+    write_picture_as,
 };

@@ -3,6 +3,7 @@
 //! Each step is a function on a [`Picture`], applied in the order in which they stand here. Pictures
 //! stay linear and premultiplied; the transfer curve of sRGB is the PNG writer's.
 
+use crate::scaled;
 use rayon::prelude::*;
 use veduta::accumulate::Picture;
 
@@ -123,6 +124,21 @@ pub fn lay_on(picture: &mut Picture, background: [f32; 3]) {
     });
 }
 
+/// Lays the picture on another one, scaled to the same size; what the other lets through stays open.
+pub fn lay_on_picture(picture: &mut Picture, background: &Picture) {
+    let background = scaled(background, picture.width, picture.height);
+    let pairs = picture
+        .pixels
+        .par_iter_mut()
+        .zip(background.pixels.par_iter());
+    pairs.for_each(|(pixel, behind)| {
+        let rest = (1.0 - pixel[3]).max(0.0);
+        for (channel, behind) in pixel.iter_mut().zip(behind) {
+            *channel += rest * behind;
+        }
+    });
+}
+
 /// A value of sRGB (0 to 1) -> linear light (IEC 61966-2-1).
 pub fn linear_from_srgb(value: f32) -> f32 {
     if value <= 0.040_45 {
@@ -210,6 +226,20 @@ mod tests {
         assert_eq!(shown.pixels[0], [0.1, 0.2, 0.3, 1.0]);
         assert_eq!(shown.pixels[1], [0.55, 0.1, 0.15, 1.0]);
         assert_eq!(shown.pixels[2], [0.2, 0.3, 0.4, 1.0]);
+    }
+
+    #[test]
+    fn a_picture_behind_shows_as_much_as_is_let_through_and_keeps_its_own_opacity() {
+        let mut shown = picture(vec![[0.5, 0.0, 0.0, 0.5], [0.2, 0.3, 0.4, 1.0], [0.0; 4]]);
+        let behind = picture(vec![[0.2, 0.4, 0.6, 1.0]]);
+        lay_on_picture(&mut shown, &behind);
+        assert_eq!(shown.pixels[0], [0.6, 0.2, 0.3, 1.0]);
+        assert_eq!(shown.pixels[1], [0.2, 0.3, 0.4, 1.0]);
+        assert_eq!(shown.pixels[2], [0.2, 0.4, 0.6, 1.0]);
+
+        let mut open = picture(vec![[0.0; 4]]);
+        lay_on_picture(&mut open, &picture(vec![[0.1, 0.1, 0.1, 0.5]]));
+        assert_eq!(open.pixels[0][3], 0.5);
     }
 
     #[test]

@@ -71,6 +71,21 @@ impl VisibilityMap {
         }
     }
 
+    /// The opaque fragment that is seen at a point of the image plane: an index into
+    /// [`VisibilityMap::opaque`]. `None` for the background.
+    ///
+    /// On the border between fragments it is the first of them. Takes time in proportion to the number
+    /// of fragments.
+    pub fn opaque_at(&self, image: DVec2) -> Option<usize> {
+        self.opaque.iter().position(|fragment| {
+            let polygon = self.polygon(fragment);
+            (0..polygon.len()).all(|k| {
+                let (from, to) = (polygon[k], polygon[(k + 1) % polygon.len()]);
+                veduta_geometry::cross(to - from, image - from) >= 0.0
+            })
+        })
+    }
+
     /// Checks the invariants; the first that fails is returned.
     ///
     /// # Errors
@@ -122,5 +137,54 @@ impl VisibilityMap {
             sum += area;
         }
         Ok(sum)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ObjectId, Projection, Side};
+    use veduta_geometry::{Affine, DVec3};
+
+    #[test]
+    fn a_point_finds_the_fragment_that_it_lies_in() {
+        let lens = Projection::Parallel {
+            height: 1.0,
+            aspect: 1.0,
+        };
+        let camera = Camera::looking(DVec3::ZERO, DVec3::Y, DVec3::Z, lens, 0.0);
+        let mut faces = Faces::new();
+        let plane = faces.push_plane(Affine::new(0.0, 0.0, 1.0));
+        let square = [[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75]].map(DVec2::from);
+        let [below, right] = [DVec2::new(0.0, 0.5), DVec2::new(0.25, 0.0)];
+        let mut push = |by: DVec2| {
+            let outline = square.map(|corner| corner + by);
+            faces
+                .push(&outline, plane, ObjectId(0), 0)
+                .expect("has an area")
+        };
+        let (first, second) = (push(DVec2::ZERO), push(right));
+        let mut opaque = Fragments::new();
+        opaque.push_whole(first);
+        // What the first leaves of the second.
+        let rest = [square[1], square[1] + right, square[2] + right, square[2]];
+        let side = Side::of_outline(first, 1);
+        opaque.push_cut(second, rest.map(|vertex| (vertex, side)).into_iter());
+        let map = VisibilityMap {
+            camera: camera.expect("a sound camera"),
+            faces,
+            opaque,
+            veils: Fragments::new(),
+        };
+        map.check().expect("sound");
+        let middle = DVec2::splat(0.5);
+        assert_eq!(map.opaque_at(middle), Some(0));
+        assert_eq!(map.opaque_at(DVec2::new(0.875, 0.5)), Some(1));
+        assert_eq!(
+            map.opaque_at(square[1]),
+            Some(0),
+            "the first of two on the border"
+        );
+        assert_eq!(map.opaque_at(middle + below), None);
     }
 }

@@ -1,6 +1,13 @@
 //! The verbs, a file for each.
 
+pub mod check;
+pub mod completions;
+pub mod diff;
+pub mod examples;
 pub mod info;
+mod look;
+pub mod man;
+mod output;
 pub mod render;
 
 use crate::exit::{Code, Failure};
@@ -8,7 +15,7 @@ use crate::talk::Talk;
 use clap::ValueEnum;
 use std::path::Path;
 use veduta::scene::Scene;
-use veduta_io::{ReadOptions, UpAxis, read_scene};
+use veduta_io::{PictureFormat, ReadOptions, UpAxis, read_scene};
 
 /// `--up-axis`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -26,6 +33,21 @@ impl From<UpAxisArgument> for UpAxis {
             UpAxisArgument::Z => UpAxis::Z,
         }
     }
+}
+
+/// Whether the file's suffix is that of a picture; everything else is taken for a model.
+fn is_picture(path: &Path) -> bool {
+    PictureFormat::of(path).is_ok()
+}
+
+/// Refuses to write where something stands already, unless told to. Pictures need no leave: they can
+/// be made again.
+fn refuse_to_replace(path: &Path, force: bool) -> Result<(), Failure> {
+    if force || !path.exists() {
+        return Ok(());
+    }
+    let message = format!("{}: exists already; --force replaces it", path.display());
+    Err(Failure::new(Code::Usage, message))
 }
 
 /// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.

@@ -1,28 +1,30 @@
+use super::look::Look;
+use super::output::Output;
 use super::{UpAxisArgument, load};
 use crate::exit::{Code, Failure};
-use crate::talk::{Talk, print};
-use crate::values::{self, Background, FieldOfView, Size};
-use clap::{Args, ValueEnum};
+use crate::preview::Screen;
+use crate::talk::{Talk, print, print_bytes};
+use crate::values::{self, FieldOfView, Size};
+use clap::Args;
 use std::path::{Path, PathBuf};
-use veduta::accumulate::Picture;
 use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::DVec3;
-use veduta_io::tone::{self, Exposure, Tone};
-use veduta_io::{PictureFormat, PictureOptions, PngDepth, write_picture};
+use veduta_io::scaled;
 
 /// Make a picture of a model
 ///
 /// Without a camera the whole model is shown, three quarters from the front right and a little from
 /// above. World axes: Z is up; a model's front is -Y.
+///
+/// Pictures for a display (.png, .jpg, .webp, .tif of 8 or 16 bits) are exposed and toned unless told;
+/// those for further work (.exr, .pfm, .npy, .tif of floats) are linear and left as they are.
 #[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES)]
 pub struct Render {
     /// The model: .glb, .gltf or .obj
     model: PathBuf,
-    /// The picture: .png, .exr or .npy
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
     /// Size in pixels
     #[arg(long, value_name = "WxH", default_value = "1280x960")]
     size: Size,
@@ -34,15 +36,31 @@ pub struct Render {
     strict: bool,
 
     #[command(flatten)]
+    output: Output,
+    #[command(flatten)]
     view: View,
     #[command(flatten)]
     look: Look,
 }
 
+const EXAMPLES: &str = "\
+Examples:
+  A first look, in the terminal:
+      veduta render town.obj --preview=blocks
+  From a point of view, on a colour:
+      veduta render town.obj -o a.png --eye 40,-60,25 --background '#cfdde6'
+  A plan, north upwards, with 16 bits a channel:
+      veduta render town.obj -o plan.tif --depth 16 --eye 0,0,100 --parallel 120
+  Linear light for compositing, in tiles of half floats:
+      veduta render town.obj -o town.exr --depth half --tile 64
+  Onto a photograph, through a pipe:
+      veduta render town.obj --background sky.jpg -o - | cat > town.png
+";
+
 /// Where the picture is taken from.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "View")]
-struct View {
+pub(super) struct View {
     /// A camera of the model by its name; auto shows the whole model
     #[arg(
         long,
@@ -71,58 +89,36 @@ struct View {
     near: Option<f64>,
     /// The axis of the file that points upwards; the format's habit by default
     #[arg(long, value_name = "AXIS")]
-    up_axis: Option<UpAxisArgument>,
-}
-
-/// How light becomes colour.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "Look")]
-struct Look {
-    /// Show the colours of materials as they are, without light
-    #[arg(long)]
-    unlit: bool,
-    /// none, or a colour such as #8ab4d8
-    #[arg(long, value_name = "COLOUR", default_value = "none")]
-    background: Background,
-    /// auto, or doublings of light; auto for lit .png by default, else 0
-    #[arg(long, value_name = "EV", value_parser = values::exposure, allow_hyphen_values = true)]
-    exposure: Option<Exposure>,
-    /// How highlights are rolled off; filmic for lit .png by default, else none
-    #[arg(long, value_name = "CURVE")]
-    tone: Option<ToneArgument>,
-    /// Bits of a channel of a .png
-    #[arg(long, value_name = "BITS", default_value = "8")]
-    depth: DepthArgument,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ToneArgument {
-    /// Cut off what is brighter than white
-    None,
-    /// Leave middle tones, roll off highlights
-    Filmic,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum DepthArgument {
-    /// 8 bits
-    #[value(name = "8")]
-    Eight,
-    /// 16 bits
-    #[value(name = "16")]
-    Sixteen,
+    pub(super) up_axis: Option<UpAxisArgument>,
 }
 
 impl Render {
+    /// Width and height in pixels where none are given.
+    pub const USUAL_SIZE: [u32; 2] = [1280, 960];
+
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let format = PictureFormat::of(&self.output)?;
-        refuse_output_nowhere(&self.output)?;
+        let target = self.output.target(self.size, json)?;
         let scene = load(&self.model, self.view.up_axis, self.strict, talk)?;
         let camera = self.view.camera(&self.model, &scene, self.size)?;
+        let development = self.look.development(&scene, self.strict, talk)?;
 
+        let screen = self.output.preview.and_then(Screen::of);
+        if target.is_none() && screen.is_none() {
+            let message =
+                "nothing is shown: stdout is no terminal; --preview=blocks shows it there";
+            talk.warn(message.to_owned());
+            return Ok(());
+        }
+        let size = [self.size.width, self.size.height];
+        let preview_size = screen.map(|screen| screen.size_of(size[0], size[1]));
+        // A preview alone is made in its own size: areas are exact in any.
+        let [width, height] = match (&target, preview_size) {
+            (None, Some(preview_size)) => preview_size,
+            _ => size,
+        };
         let settings = RenderSettings {
-            width: self.size.width,
-            height: self.size.height,
+            width,
+            height,
             sampling: self.sampling,
             unlit: self.look.unlit,
         };
@@ -133,27 +129,41 @@ impl Render {
             Step::Projecting => talk.begin("projecting"),
             Step::FindingVisibility => talk.begin("finding visibility"),
             Step::Shading => talk.begin("shading"),
-            Step::Strip { index: 0, .. } => talk.begin("rendering strip by strip"),
+            Step::Strip { index, count } => {
+                if index == 0 {
+                    talk.begin("rendering strip by strip");
+                }
+                talk.part(index, count);
+            }
             _ => {}
         });
         self.tell_shortcomings(&scene, &shortcomings, talk)?;
         talk.begin("developing");
-        let ev = self.look.develop(&mut picture, &scene, format);
-        talk.begin("writing");
-        let depth = match self.look.depth {
-            DepthArgument::Eight => PngDepth::Eight,
-            DepthArgument::Sixteen => PngDepth::Sixteen,
-        };
-        write_picture(&self.output, &picture, &PictureOptions { depth })?;
+        // Before it is developed, since pictures are scaled in linear light.
+        let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
+        let mut ev = 0.0;
+        if let Some(target) = &target {
+            ev = development.develop(&mut picture, !target.linear);
+            talk.begin("writing");
+            target.write(&picture)?;
+        }
+        if let (Some(screen), Some(preview)) = (screen, &mut preview) {
+            match &target {
+                Some(target) if !target.linear => development.develop_at(preview, ev, true),
+                _ => ev = development.develop(preview, true),
+            }
+            talk.end();
+            print_bytes(&screen.show(preview))?;
+        }
         talk.end();
         talk.detail(format_args!(
             "{} faces, exposure {ev:.2} EV",
             scene.face_count()
         ));
 
-        if json {
+        if let (true, Some(target)) = (json, &target) {
             let told = serde_json::json!({
-                "output": self.output.to_string_lossy(),
+                "output": target.name(),
                 "size": [self.size.width, self.size.height],
                 "faces": scene.face_count(),
                 "exposure": ev,
@@ -193,32 +203,26 @@ impl Render {
     }
 }
 
-/// Fails before the work rather than after it when the output has no folder to stand in.
-fn refuse_output_nowhere(output: &Path) -> Result<(), Failure> {
-    let folder = output
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    let found = folder.map_or(Ok(()), |folder| match std::fs::metadata(folder) {
-        Ok(metadata) if metadata.is_dir() => Ok(()),
-        Ok(_) => Err("it is not a folder".to_owned()),
-        Err(error) => Err(error.to_string()),
-    });
-    found.map_err(|reason| {
-        let folder = folder.unwrap_or(output).display();
-        let message = format!(
-            "{}: cannot be written into {folder}: {reason}",
-            output.display()
-        );
-        Failure::new(Code::InputOutput, message)
-    })
-}
-
 /// Depth of the near plane where none is given, as a share of the scene's size.
 const NEAR_SHARE: f64 = 1e-5;
 
 impl View {
+    /// Whether any of the options is given.
+    pub(super) fn is_asked_for(&self) -> bool {
+        self.camera != "auto"
+            || self.eye.is_some()
+            || self.fov.is_some()
+            || self.parallel.is_some()
+            || self.near.is_some()
+    }
+
     /// The camera that the arguments ask for.
-    fn camera(&self, model: &Path, scene: &Scene, size: Size) -> Result<Camera, Failure> {
+    pub(super) fn camera(
+        &self,
+        model: &Path,
+        scene: &Scene,
+        size: Size,
+    ) -> Result<Camera, Failure> {
         let aspect = f64::from(size.width) / f64::from(size.height);
         let Some(bounds) = Bounds::of_scene(scene) else {
             let message = format!(
@@ -327,35 +331,5 @@ impl View {
             }
         }
         Ok(camera)
-    }
-}
-
-impl Look {
-    /// Applies exposure, tone and background; tells the exposure in EV.
-    ///
-    /// Only a lit picture for a display is exposed and toned unasked: linear formats are for further
-    /// work, and unlit colours are to come through as they are.
-    fn develop(&self, picture: &mut Picture, scene: &Scene, format: PictureFormat) -> f32 {
-        let unlit = self.unlit || scene.materials.iter().all(|material| material.unlit);
-        let for_display = format == PictureFormat::Png && !unlit;
-        let (exposure, tone) = if for_display {
-            (Exposure::Auto, Tone::Filmic)
-        } else {
-            (Exposure::Ev(0.0), Tone::None)
-        };
-        let tone = match self.tone {
-            Some(ToneArgument::None) => Tone::None,
-            Some(ToneArgument::Filmic) => Tone::Filmic,
-            None => tone,
-        };
-        let ev = tone::exposure_of(picture, self.exposure.unwrap_or(exposure));
-        if ev != 0.0 {
-            tone::expose(picture, ev);
-        }
-        tone::apply_tone(picture, tone);
-        if let Background::Color(color) = self.background {
-            tone::lay_on(picture, color);
-        }
-        ev
     }
 }

@@ -1,15 +1,13 @@
-//! Writes the example scene, a suspension bridge over a river between a town and its suburb:
-//! `cargo run --release -p veduta-io --example write_example_scene -- examples`
+//! The example scene of our own: a suspension bridge over a river between a town and its suburb.
 //!
-//! The folder gets `bridge.obj` and `bridge.mtl`, byte for byte those of the repository. The scene is
-//! our own making and may be used for anything.
-//!
-//! It is made to be hard to antialias and pleasant to look at: hangers, rails and rigging that are
-//! thinner than a pixel, roofs that pierce walls, water that pierces the banks.
+//! Our own making; it may be used for anything. It is made to be hard to antialias and pleasant to
+//! look at: hangers, rails and rigging that are thinner than a pixel, roofs that pierce walls, water
+//! that pierces the banks.
 
-use std::fmt::Write as _;
-use std::path::Path;
-use veduta_geometry::DVec3;
+use veduta::map::MaterialId;
+use veduta::scene::{Material, Mesh, MeshId, Object, Scene};
+use veduta_geometry::{DMat4, DVec3};
+use veduta_io::tone::linear_from_srgb;
 
 // The bridge runs along X over a river along Y. Metres, Z up, water at z = 0.
 /// Half of the model's extent.
@@ -59,11 +57,8 @@ const MATERIALS: &[(&str, u32)] = &[
     ("hull", 0x7a3f2c),
 ];
 
-fn main() -> std::io::Result<()> {
-    let Some(folder) = std::env::args_os().nth(1) else {
-        eprintln!("Usage: write_example_scene FOLDER");
-        std::process::exit(2);
-    };
+/// The scene.
+pub fn scene() -> Scene {
     let mut model = Model::new();
     terrain(&mut model);
     water(&mut model);
@@ -73,76 +68,105 @@ fn main() -> std::io::Result<()> {
     }
     cables_and_hangers(&mut model);
     town(&mut model);
-    for (x, y, heading) in [
+    for (number, (x, y, heading)) in [
         (-30.0, -170.0, -2.4),
         (75.0, -80.0, -2.1),
         (40.0, 170.0, 2.2),
-    ] {
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        model.object(&format!("boat {}", number + 1));
         boat(&mut model, DVec3::new(x, y, 0.0), heading);
     }
-    let folder = Path::new(&folder);
-    std::fs::write(folder.join("bridge.obj"), model.text)?;
-    std::fs::write(folder.join("bridge.mtl"), material_library())
+    model.finish()
 }
 
-/// The text of an OBJ file, as it grows.
+/// The scene as it grows, object by object.
 struct Model {
-    text: String,
-    vertices: usize,
-    material: &'static str,
+    scene: Scene,
+    mesh: Mesh,
+    name: String,
 }
 
 impl Model {
     fn new() -> Self {
+        let materials = MATERIALS.iter().map(|&(name, hex)| {
+            let [r, g, b] = [16, 8, 0].map(|shift| {
+                let light = linear_from_srgb(((hex >> shift) & 255) as f32 / 255.0);
+                // Four digits are enough, and read well.
+                (light * 10_000.0).round() / 10_000.0
+            });
+            Material {
+                name: name.to_owned(),
+                base_color: [r, g, b, 1.0],
+                ..Material::default()
+            }
+        });
         Self {
-            text: "# Made by crates/veduta-io/examples/write_example_scene.rs. Y up, metres.\n\
-                mtllib bridge.mtl\n"
-                .to_owned(),
-            vertices: 0,
-            material: "",
+            scene: Scene {
+                materials: materials.collect(),
+                ..Scene::default()
+            },
+            mesh: Mesh::default(),
+            name: String::new(),
         }
     }
 
+    /// Begins an object.
     fn object(&mut self, name: &str) {
-        writeln!(self.text, "o {name}").expect("strings grow");
+        self.end_object();
+        self.name = name.to_owned();
     }
 
-    /// Adds a vertex; the file has Y up and the front towards Z. Millimetres are enough, and keep
-    /// the file small.
-    fn vertex(&mut self, point: DVec3) -> usize {
-        let [x, y, z] = [point.x, point.z, -point.y].map(|value| {
-            // No "-0".
-            let rounded = (value * 1000.0).round() / 1000.0;
-            if rounded == 0.0 { 0.0 } else { rounded }
+    fn end_object(&mut self) {
+        let mesh = std::mem::take(&mut self.mesh);
+        if mesh.triangles.is_empty() {
+            return;
+        }
+        self.scene.objects.push(Object {
+            name: std::mem::take(&mut self.name),
+            mesh: MeshId(self.scene.meshes.len() as u32),
+            world_from_object: DMat4::IDENTITY,
         });
-        writeln!(self.text, "v {x} {y} {z}").expect("strings grow");
-        self.vertices += 1;
-        self.vertices
+        self.scene.meshes.push(mesh);
+    }
+
+    fn finish(mut self) -> Scene {
+        self.end_object();
+        self.scene
+    }
+
+    /// Adds a vertex. Millimetres are enough, and keep files small.
+    fn vertex(&mut self, point: DVec3) -> u32 {
+        // Adding 0 leaves no "-0".
+        let rounded = (point * 1000.0).round() / 1000.0 + DVec3::ZERO;
+        self.mesh.positions.push(rounded);
+        self.mesh.positions.len() as u32 - 1
     }
 
     /// A face over vertices that exist already, counterclockwise seen from its front.
-    fn face(&mut self, material: &'static str, corners: &[usize]) {
-        if material != self.material {
-            writeln!(self.text, "usemtl {material}").expect("strings grow");
-            self.material = material;
+    fn face(&mut self, material: &'static str, corners: &[u32]) {
+        let row = MATERIALS.iter().position(|(name, _)| *name == material);
+        let id = MaterialId::from_index(row.expect("a name of the list"));
+        let materials = &mut self.mesh.materials;
+        if materials.last().is_none_or(|&(_, last)| last != id) {
+            let face = self.mesh.face_count() as u32;
+            self.mesh.materials.push((face, id));
         }
-        self.text.push('f');
-        for corner in corners {
-            write!(self.text, " {corner}").expect("strings grow");
-        }
-        self.text.push('\n');
+        self.mesh.push_polygon(corners);
     }
 
     /// A planar polygon with vertices of its own.
     fn polygon(&mut self, material: &'static str, corners: &[DVec3]) {
-        let corners: Vec<usize> = corners.iter().map(|&corner| self.vertex(corner)).collect();
+        let corners: Vec<u32> = corners.iter().map(|&corner| self.vertex(corner)).collect();
         self.face(material, &corners);
     }
 
     /// A prism without floor over a convex base in the plane z = `bottom`, counterclockwise seen
     /// from above.
     fn prism(&mut self, base: &[[f64; 2]], bottom: f64, top: f64, wall: &'static str) {
-        let mut ring = |z| -> Vec<usize> {
+        let mut ring = |z| -> Vec<u32> {
             base.iter()
                 .map(|&[x, y]| self.vertex(DVec3::new(x, y, z)))
                 .collect()
@@ -230,15 +254,19 @@ fn terrain(model: &mut Model) {
     model.object("land");
     let mut first = Vec::with_capacity(rows + 1);
     for row in 0..=rows {
-        first.push(model.vertices + 1);
+        first.push(model.mesh.positions.len());
         for column in 0..=columns {
             model.vertex(at(column, row));
         }
     }
     for row in 0..rows {
         for column in 0..columns {
-            let corner =
-                |i: usize, j: usize| (at(column + i, row + j), first[row + j] + column + i);
+            let corner = |i: usize, j: usize| {
+                (
+                    at(column + i, row + j),
+                    (first[row + j] + column + i) as u32,
+                )
+            };
             let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
             for face in [[a, b, c], [a, c, d]] {
                 let [p, q, r] = face.map(|(point, _)| point);
@@ -288,7 +316,7 @@ fn water(model: &mut Model) {
     const STEP: f64 = 15.0;
     const COLUMNS: usize = 28;
     let rows = (2.0 * HALF_Y / STEP) as usize;
-    let first = model.vertices + 1;
+    let first = model.mesh.positions.len();
     for row in 0..=rows {
         for column in 0..=COLUMNS {
             let x = STEP * (column as f64 - 0.5 * COLUMNS as f64);
@@ -301,8 +329,8 @@ fn water(model: &mut Model) {
     }
     for row in 0..rows {
         for column in 0..COLUMNS {
-            let a = first + row * (COLUMNS + 1) + column;
-            let [b, c, d] = [a + 1, a + COLUMNS + 2, a + COLUMNS + 1];
+            let corner = first + row * (COLUMNS + 1) + column;
+            let [a, b, c, d] = [0, 1, COLUMNS + 2, COLUMNS + 1].map(|k| (corner + k) as u32);
             model.face("water", &[a, b, c]);
             model.face("water", &[a, c, d]);
         }
@@ -573,7 +601,7 @@ fn gabled(
 /// A pyramid.
 fn spire(model: &mut Model, base: &[[f64; 2]], bottom: f64, top: DVec3, material: &'static str) {
     let tip = model.vertex(top);
-    let ring: Vec<usize> = base
+    let ring: Vec<u32> = base
         .iter()
         .map(|&[x, y]| model.vertex(DVec3::new(x, y, bottom)))
         .collect();
@@ -601,7 +629,6 @@ fn tree(model: &mut Model, random: &mut Random, place: DVec3) {
 
 /// A two-masted boat with its rigging.
 fn boat(model: &mut Model, place: DVec3, heading: f64) {
-    model.object("boat");
     let (sin, cos) = heading.sin_cos();
     let at = |along: f64, across: f64, z: f64| {
         place + DVec3::new(along * cos - across * sin, along * sin + across * cos, z)
@@ -644,22 +671,4 @@ fn boat(model: &mut Model, place: DVec3, heading: f64) {
         &[at(19.0, 0.0, 4.5), at(7.5, 1.5, 5.5), at(6.2, 0.0, 29.0)],
     );
     model.rod(at(20.0, 0.0, 3.0), at(6.0, 0.0, 32.0), 0.12, "wire");
-}
-
-/// The colours, linear as `Kd` is.
-fn material_library() -> String {
-    let mut text =
-        "# Made by crates/veduta-io/examples/write_example_scene.rs. Kd is linear.\n".to_owned();
-    for &(name, hex) in MATERIALS {
-        let [r, g, b] = [16, 8, 0].map(|shift| {
-            let value = f64::from((hex >> shift) & 255) / 255.0;
-            if value <= 0.04045 {
-                value / 12.92
-            } else {
-                ((value + 0.055) / 1.055).powf(2.4)
-            }
-        });
-        writeln!(text, "newmtl {name}\nKd {r:.4} {g:.4} {b:.4}").expect("strings grow");
-    }
-    text
 }

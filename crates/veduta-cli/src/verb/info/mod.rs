@@ -1,0 +1,157 @@
+//! `veduta info`: what a model or a picture holds, and what a camera sees at a point of a picture.
+
+mod model;
+mod pick;
+mod tree;
+
+use super::render::View;
+use super::{is_picture, load};
+use crate::exit::{Code, Failure};
+use crate::talk::{Talk, plain, print};
+use crate::values::Size;
+use clap::Args;
+use pick::Spot;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use veduta_io::{LoadedPicture, read_picture};
+
+/// Tell what is inside a model or a picture
+///
+/// With --pick: which object, face and material are seen at a point of the picture that `veduta
+/// render` would make with the same options, where in the world that is, and with which exact areas
+/// the pixel there shows which faces.
+#[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Info {
+    /// The model (.glb, .gltf, .obj) or picture
+    file: PathBuf,
+    /// List all objects, not only the first
+    #[arg(long)]
+    all: bool,
+    /// Make every warning an error
+    #[arg(long)]
+    strict: bool,
+    /// Tell what is seen at a pixel, counted from 0 at the top left; 12,7 means the middle of that
+    /// pixel, 12.5,7.0 the exact point
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    pick: Option<Spot>,
+    /// Size in pixels of the picture that is picked from
+    #[arg(long, value_name = "WxH", default_value = "1280x960")]
+    size: Size,
+    #[command(flatten)]
+    view: View,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  What is inside a model:
+      veduta info town.obj
+  The names of its objects, for another program:
+      veduta info town.obj --json
+  What the default view shows in the middle of a picture of 320 x 240 pixels:
+      veduta info town.obj --size 320x240 --pick 160,120
+  What a picture holds:
+      veduta info sky.jpg
+";
+
+impl Info {
+    pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if self.pick.is_none() && self.view.is_asked_for() {
+            let message = "options of the view are for --pick; add it, or leave them out";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let (mut told, text) = if is_picture(&self.file) {
+            self.picture(talk)?
+        } else {
+            self.model(talk)?
+        };
+        if json {
+            told["file"] = self.file.to_string_lossy().into();
+            told["warnings"] = talk.warnings().into();
+            print(&format!("{told}\n"))
+        } else {
+            print(&format!("{}\n{text}", plain(&self.file.to_string_lossy())))
+        }
+    }
+
+    /// JSON and text.
+    fn model(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
+        let scene = load(&self.file, self.view.up_axis, self.strict, talk)?;
+        let Some(spot) = self.pick else {
+            return Ok((model::as_json(&scene), model::as_text(&scene, self.all)));
+        };
+        let camera = self.view.camera(&self.file, &scene, self.size)?;
+        talk.begin("finding visibility");
+        let picked = pick::pick(&scene, &camera, self.size, spot)?;
+        talk.end();
+        Ok((picked.as_json(), picked.as_text()))
+    }
+
+    fn picture(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
+        if self.pick.is_some() {
+            let message = "--pick is for models: a picture does not know what it shows";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        talk.begin("reading");
+        let loaded = read_picture(&self.file)?;
+        talk.end();
+        for warning in &loaded.warnings {
+            let message = format!("{}: {warning}", self.file.display());
+            if self.strict {
+                let message = format!("{message} (an error because of --strict)");
+                return Err(Failure::new(Code::BadInput, message));
+            }
+            talk.warn(message);
+        }
+        Ok(picture_told(&loaded))
+    }
+}
+
+/// What a picture holds, as JSON and text.
+fn picture_told(loaded: &LoadedPicture) -> (Value, String) {
+    let picture = &loaded.picture;
+    let count = picture.pixels.len() as f64;
+    let mut low = [f32::INFINITY; 4];
+    let mut high = [f32::NEG_INFINITY; 4];
+    let mut sums = [0.0; 4];
+    let mut not_finite = 0;
+    for pixel in &picture.pixels {
+        if !pixel.iter().all(|value| value.is_finite()) {
+            not_finite += 1;
+            continue;
+        }
+        for (k, &value) in pixel.iter().enumerate() {
+            low[k] = low[k].min(value);
+            high[k] = high[k].max(value);
+            sums[k] += f64::from(value);
+        }
+    }
+    let finite = count - f64::from(not_finite);
+    let mean = sums.map(|sum| sum / finite.max(1.0));
+    let stored = if loaded.linear { "linear" } else { "sRGB" };
+    let json = json!({
+        "size": [picture.width, picture.height],
+        "stored": stored,
+        "min": (finite > 0.0).then_some(low),
+        "max": (finite > 0.0).then_some(high),
+        "mean": (finite > 0.0).then_some(mean),
+        "notFinite": not_finite,
+    });
+    let mut text = format!(
+        "  size      {} x {} pixels\n  stored    {stored}\n",
+        picture.width, picture.height
+    );
+    if finite > 0.0 {
+        text += "  linear light, premultiplied     min         mean          max\n";
+        for (k, name) in ["red", "green", "blue", "opacity"].into_iter().enumerate() {
+            text += &format!(
+                "    {name:20} {:12.6} {:12.6} {:12.6}\n",
+                low[k], mean[k], high[k]
+            );
+        }
+    }
+    if not_finite > 0 {
+        text += &format!("  pixels that are not finite: {not_finite}\n");
+    }
+    (json, text)
+}

@@ -1,0 +1,125 @@
+//! How light becomes colour: exposure, tone, background.
+
+use crate::exit::{Code, Failure};
+use crate::talk::Talk;
+use crate::values::{self, Background};
+use clap::{Args, ValueEnum};
+use veduta::accumulate::Picture;
+use veduta::scene::Scene;
+use veduta_io::read_picture;
+use veduta_io::tone::{self, Exposure, Tone};
+
+/// How light becomes colour.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Look")]
+pub struct Look {
+    /// Show the colours of materials as they are, without light
+    #[arg(long)]
+    pub unlit: bool,
+    /// none, a colour such as #8ab4d8, or a picture, which is scaled to the frame
+    #[arg(long, value_name = "COLOUR|FILE", default_value = "none")]
+    background: Background,
+    /// auto, or doublings of light; by default auto for lit pictures for a display, else 0
+    #[arg(long, value_name = "EV", value_parser = values::exposure, allow_hyphen_values = true)]
+    exposure: Option<Exposure>,
+    /// How highlights are rolled off; by default filmic for lit pictures for a display, else none
+    #[arg(long, value_name = "CURVE")]
+    tone: Option<ToneArgument>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ToneArgument {
+    /// Cut off what is brighter than white
+    None,
+    /// Leave middle tones, roll off highlights above 0.6 (the shoulder of Reinhard et al. 2002)
+    Filmic,
+}
+
+/// What pictures are laid on.
+#[derive(Debug)]
+enum Backdrop {
+    None,
+    Color([f32; 3]),
+    Picture(Picture),
+}
+
+/// How the pictures of one scene are developed.
+#[derive(Debug)]
+pub struct Development {
+    backdrop: Backdrop,
+    exposure: Option<Exposure>,
+    tone: Option<Tone>,
+    unlit: bool,
+}
+
+impl Look {
+    /// Reads what the look needs, before the work rather than after it.
+    pub fn development(
+        &self,
+        scene: &Scene,
+        strict: bool,
+        talk: &mut Talk,
+    ) -> Result<Development, Failure> {
+        let backdrop = match &self.background {
+            Background::None => Backdrop::None,
+            Background::Color(color) => Backdrop::Color(*color),
+            Background::Picture(path) => {
+                let loaded = read_picture(path)?;
+                for warning in loaded.warnings {
+                    let message = format!("{}: {warning}", path.display());
+                    if strict {
+                        let message = format!("{message} (an error because of --strict)");
+                        return Err(Failure::new(Code::BadInput, message));
+                    }
+                    talk.warn(message);
+                }
+                Backdrop::Picture(loaded.picture)
+            }
+        };
+        Ok(Development {
+            backdrop,
+            exposure: self.exposure,
+            tone: self.tone.map(|tone| match tone {
+                ToneArgument::None => Tone::None,
+                ToneArgument::Filmic => Tone::Filmic,
+            }),
+            unlit: self.unlit || scene.materials.iter().all(|material| material.unlit),
+        })
+    }
+}
+
+impl Development {
+    /// Applies exposure, tone and background; tells the exposure in EV.
+    ///
+    /// Only a lit picture for a display is exposed and toned unasked: linear formats are for further
+    /// work, and unlit colours are to come through as they are.
+    pub fn develop(&self, picture: &mut Picture, for_display: bool) -> f32 {
+        let unasked = for_display && !self.unlit;
+        let exposure = self.exposure.unwrap_or(if unasked {
+            Exposure::Auto
+        } else {
+            Exposure::Ev(0.0)
+        });
+        let ev = tone::exposure_of(picture, exposure);
+        self.develop_at(picture, ev, for_display);
+        ev
+    }
+
+    /// [`Development::develop`] with an exposure that is known.
+    pub fn develop_at(&self, picture: &mut Picture, ev: f32, for_display: bool) {
+        if ev != 0.0 {
+            tone::expose(picture, ev);
+        }
+        let curve = self.tone.unwrap_or(if for_display && !self.unlit {
+            Tone::Filmic
+        } else {
+            Tone::None
+        });
+        tone::apply_tone(picture, curve);
+        match &self.backdrop {
+            Backdrop::None => {}
+            Backdrop::Color(color) => tone::lay_on(picture, *color),
+            Backdrop::Picture(behind) => tone::lay_on_picture(picture, behind),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+use crate::{FACING, Folder, png};
+
+/// What `diff` says of two pictures.
+fn difference(folder: &Folder, a: &str, b: &str, more: &str) -> serde_json::Value {
+    folder.json(&format!("diff {a} {b} --tolerance 10 {more}"))
+}
+
+#[test]
+fn every_format_holds_the_same_picture() {
+    let folder = Folder::new();
+    let render = format!("render town.obj {FACING} --unlit --background #336699");
+    for output in [
+        "a.png",
+        "b.png --depth 16",
+        "c.tif",
+        "d.tiff --depth 16",
+        "e.tif --depth float",
+        "f.webp",
+        "g.jpg --quality 100",
+        "h.exr",
+        "i.exr --depth half --tile 4 --compression piz",
+        "j.pfm",
+        "k.npy",
+    ] {
+        folder.told(&format!("{render} -o {output}"));
+        let name = output.split(' ').next().expect("a name");
+        let found = difference(&folder, "a.png", name, "");
+        let largest = found["max"].as_f64().unwrap_or(0.0);
+        // Half a step of 8 bits, in light a step at its steepest; a JPEG blurs edges of colour.
+        let most = match name {
+            "g.jpg" => 0.05,
+            _ if found["space"] == "sRGB" => 0.5 / 255.0 + 1e-6,
+            _ => 2.3 * 0.5 / 255.0 + 1e-4,
+        };
+        assert!(largest <= most, "{output}: {found}");
+    }
+}
+
+#[test]
+fn what_is_linear_is_left_as_it_is_unless_asked() {
+    let folder = Folder::new();
+    // Lit: a picture for a display is exposed and toned, one for further work is not.
+    let render = format!("render town.obj {FACING}");
+    for (output, exposed) in [
+        ("a.png", true),
+        ("a.jpg", true),
+        ("a.tif", true),
+        ("a.webp", true),
+        ("a.tif --depth float", false),
+        ("a.exr", false),
+        ("a.pfm", false),
+        ("a.npy", false),
+    ] {
+        let made = folder.json(&format!("{render} -o {output}"));
+        let exposure = made["exposure"].as_f64().expect("an exposure");
+        assert_eq!(exposure != 0.0, exposed, "{output}: {exposure}");
+    }
+    folder.told(&format!("{render} -o once.npy"));
+    folder.told(&format!("{render} -o twice.npy --exposure 1"));
+    let [once, twice] = ["once.npy", "twice.npy"].map(|name| folder.json(&format!("info {name}")));
+    for channel in 0..3 {
+        let [once, twice] =
+            [&once, &twice].map(|told| told["max"][channel].as_f64().expect("a number"));
+        assert_eq!(2.0 * once, twice);
+    }
+}
+
+#[test]
+fn a_jpeg_is_on_white_or_on_the_background() {
+    let folder = Folder::new();
+    for (background, expected) in [("none", 1.0), ("#000", 0.0)] {
+        let render = format!("render town.obj {FACING} --unlit --background {background}");
+        folder.told(&format!("{render} -o a.jpg --quality 100"));
+        let found = folder.json("info a.jpg");
+        // Red and blue leave no pixel of green, so that green comes from the background alone.
+        let green = found["mean"][1].as_f64().expect("a number");
+        assert!(
+            (green - 0.75 * expected).abs() < 0.02,
+            "{background}: {green}"
+        );
+    }
+}
+
+#[test]
+fn a_picture_as_background_is_scaled_to_the_frame_in_linear_light() {
+    let folder = Folder::new();
+    let render = format!("render town.obj {FACING} --unlit");
+    // A background of one colour, in another size and format.
+    let wall = "--eye 0.5,-5,0.5 --look-at 0.5,0,0.5 --parallel 0.1";
+    folder.told(&format!(
+        "render town.obj {wall} --size 3x5 --unlit -o red.webp"
+    ));
+    folder.told(&format!("{render} --background red.webp -o a.png"));
+    folder.told(&format!("{render} --background #ff0000 -o b.png"));
+    assert_eq!(difference(&folder, "a.png", "b.png", "")["differing"], 0);
+
+    // Black and white in turn become half the light, which is more than half of sRGB.
+    let mut pfm = b"PF\n16 16\n-1\n".to_vec();
+    for index in 0..256 {
+        let light = ((index + index / 16) % 2) as f32;
+        pfm.extend([light; 3].into_iter().flat_map(f32::to_le_bytes));
+    }
+    folder.write("checks.pfm", pfm);
+    folder.told(&format!("{render} --background checks.pfm -o c.png"));
+    let (_, _, pixels) = png(&folder.read("c.png"));
+    assert_eq!(pixels[3 * 8 + 1], [188, 188, 188, 255]);
+
+    folder
+        .veduta(&format!("{render} --background gone.jpg -o d.png"))
+        .assert()
+        .code(6);
+    folder.write("broken.png", "no picture");
+    folder
+        .veduta(&format!("{render} --background broken.png -o d.png"))
+        .assert()
+        .code(4);
+    assert!(!folder.path("d.png").exists());
+}
+
+/// Outputs that make no sense: exit code 2, and what the message holds.
+const SENSELESS: &[(&str, &str)] = &[
+    ("", "--output <FILE>"),
+    (
+        "-o a.png --depth half",
+        "a.png: a picture of that format is stored as 8 bits or 16 bits, not as half floats",
+    ),
+    ("-o a.jpg --depth 16", "stored as 8 bits"),
+    ("-o a.exr --depth 8", "stored as floats or half floats"),
+    ("-o a.png --quality 50", "--quality is for .jpg"),
+    ("-o a.jpg --quality 0", "--quality"),
+    (
+        "-o a.tif --tile 64",
+        "--compression and --tile are for .exr",
+    ),
+    ("-o a.exr --tile 0", "--tile"),
+    ("-o a.png --format gif", "expected one of png, jpg"),
+    ("-o a.webp --size 16385x1", "at most 16384 pixels a side"),
+    ("-o - --json", "both write to stdout"),
+    ("-o - --preview", "both write to stdout"),
+    ("--preview --json", "cannot be used with"),
+];
+
+#[test]
+fn outputs_that_make_no_sense_are_refused_before_the_work() {
+    let folder = Folder::new();
+    let before = folder.files();
+    for (arguments, message) in SENSELESS {
+        let output = folder
+            .veduta(&format!("render town.obj {arguments}"))
+            .assert()
+            .code(2)
+            .stdout("");
+        let stderr = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert!(stderr.contains(message), "{arguments}: {stderr}");
+    }
+    assert_eq!(folder.files(), before);
+}
+
+#[test]
+fn a_format_that_is_told_wins_over_the_suffix() {
+    let folder = Folder::new();
+    folder.told(&format!("render town.obj {FACING} -o picture --format png"));
+    assert_eq!(png(&folder.read("picture")).0, 8);
+}

@@ -1,0 +1,47 @@
+use super::decoded::{Channels, Decoded, Samples};
+use super::{PictureProblem, check_size};
+use exr::error::Error;
+use exr::meta::MetaData;
+use exr::prelude::{ReadChannels, ReadLayers};
+use std::io::Cursor;
+
+/// Reads the first layer that has R, G and B, with A if it has it.
+pub fn read(bytes: &[u8]) -> Result<Decoded, PictureProblem> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(problem)?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        check_size(size.width() as u64, size.height() as u64, bytes.len())?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| (size, vec![[0.0f32; 4]; size.area()]),
+            |(size, pixels), at, (r, g, b, a): (f32, f32, f32, f32)| {
+                pixels[at.1 * size.0 + at.0] = [r, g, b, a];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        // The same order of work in every run; and what is read is small beside what is made.
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(problem)?;
+    let (size, pixels) = image.layer_data.channel_data.pixels;
+    let (width, height) = check_size(size.0 as u64, size.1 as u64, bytes.len())?;
+    Ok(Decoded {
+        width,
+        height,
+        channels: Channels::ColorOpacity,
+        samples: Samples::F32(pixels.into_flattened()),
+        premultiplied: true,
+        warnings: Vec::new(),
+    })
+}
+
+fn problem(error: Error) -> PictureProblem {
+    match error {
+        Error::NotSupported(message) => PictureProblem::Unsupported(message.into_owned()),
+        other => PictureProblem::Damaged(other.to_string().replace('\n', " ")),
+    }
+}
