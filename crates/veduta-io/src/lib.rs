@@ -7,16 +7,18 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
-#[cfg(any(feature = "gltf", feature = "obj"))]
+#[cfg(any(feature = "gltf", feature = "obj", feature = "toml"))]
 mod read;
 pub mod tone;
 mod write;
 
-#[cfg(any(feature = "gltf", feature = "obj"))]
+#[cfg(any(feature = "gltf", feature = "obj", feature = "toml"))]
 pub use read::{
-    ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
-    read_scene,
+    Detail, ErrorKind, Excerpt, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES,
+    UpAxis, Warning, read_scene,
 };
+#[cfg(feature = "toml")]
+pub use read::{closest_name, scene_file_schema};
 pub use write::{
     PICTURE_SUFFIXES, PictureFormat, PictureOptions, PngDepth, WriteError, WriteProblem,
     remove_unfinished, write_picture,

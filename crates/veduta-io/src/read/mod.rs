@@ -11,13 +11,19 @@ mod files;
 mod finish;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(feature = "gltf")]
+#[cfg(any(feature = "gltf", feature = "toml"))]
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
 mod picture;
+#[cfg(feature = "toml")]
+mod scene_file;
 
-pub use error::{ErrorKind, Place, Problem, ReadError, Warning};
+pub use error::{Detail, ErrorKind, Excerpt, Place, Problem, ReadError, Warning};
+#[cfg(feature = "toml")]
+pub use names::closest as closest_name;
+#[cfg(feature = "toml")]
+pub use scene_file::scene_file_schema;
 
 use budget::Budget;
 use error::{Fault, Warnings};
@@ -49,6 +55,11 @@ pub struct Loaded {
     pub scene: Scene,
     /// What a user should know.
     pub warnings: Vec<Warning>,
+    /// Name of the camera that a scene file means to be used where none is asked for.
+    pub default_camera: Option<String>,
+    /// Widths and heights in pixels that cameras of a scene file mean their pictures to have, by the
+    /// cameras' names.
+    pub picture_sizes: Vec<(String, [u32; 2])>,
 }
 
 /// Suffixes of the files that [`read_scene`] reads.
@@ -59,6 +70,8 @@ pub const SCENE_SUFFIXES: &[&str] = &[
     "gltf",
     #[cfg(feature = "obj")]
     "obj",
+    #[cfg(feature = "toml")]
+    "toml",
 ];
 
 /// Reads a scene from a file and the files it names.
@@ -69,15 +82,22 @@ pub const SCENE_SUFFIXES: &[&str] = &[
 /// # Errors
 /// When the file cannot be read, is damaged, or needs what is not supported. Never panics.
 pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
+    #[cfg(feature = "toml")]
+    if scene_file::is_scene_file(path) {
+        return scene_file::read(path, options);
+    }
+    read_model(path, options)
+}
+
+/// Reads a scene from a file that is no scene file.
+fn read_model(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut warnings = Warnings::new(path.to_owned());
-    let scene = read(path, options, &mut warnings).map_err(|fault| ReadError {
-        file: path.to_owned(),
-        place: fault.place,
-        problem: fault.problem,
-    })?;
+    let scene = read(path, options, &mut warnings).map_err(|fault| fault.of(path))?;
     Ok(Loaded {
         scene,
         warnings: warnings.finish(),
+        default_camera: None,
+        picture_sizes: Vec::new(),
     })
 }
 

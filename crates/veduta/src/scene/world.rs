@@ -11,6 +11,8 @@ pub struct World {
     pub crs: Option<String>,
     /// What stands at (0, 0, 0) of the world, in the coordinates of `crs`.
     pub origin: DVec3,
+    /// What heights are counted from, such as `NAP`, where `crs` does not say it.
+    pub vertical_datum: Option<String>,
 }
 
 /// A part of a scene that can be made apart from the others and composited with them.
