@@ -121,7 +121,7 @@ fn scene(cells: u32) -> Scene {
             ..Material::default()
         }],
         images: vec![image],
-        cameras: Vec::new(),
+        ..Scene::default()
     }
 }
 

@@ -372,6 +372,32 @@ mod tests {
     }
 
     #[test]
+    fn a_square_looks_like_its_two_halves() {
+        let mut halves = ground(2.0, 1);
+        let ramp = |p: &DVec3| [0.5 + 0.1 * p.x, 0.5 + 0.2 * p.y, 1.0].map(|c| c as f32);
+        halves.colors = halves.positions.iter().map(ramp).collect();
+        let mut square = Mesh {
+            triangles: Vec::new(),
+            ..halves.clone()
+        };
+        square.push_polygon(&[2, 3, 1, 0]);
+        // From outside, and from a corner of it, so that much of it is behind the eye.
+        for eye in [DVec3::new(1.0, -4.0, 1.5), DVec3::new(-1.9, -1.8, 0.3)] {
+            let [halves, square] = [&halves, &square].map(|mesh| {
+                let scene = scene_of(mesh.clone(), Material::default());
+                let map = find_visibility(&scene, &perspective(eye, 0.5, 1.5));
+                render_map(&scene, &map, &unlit(90, 60))
+            });
+            for (a, b) in halves.pixels.iter().zip(&square.pixels) {
+                for (a, b) in a.iter().zip(b) {
+                    // Along the diagonal one looks at two centroids, the other at one.
+                    assert!((a - b).abs() < 1e-3, "{a} and {b}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_fine_pattern_far_away_is_grey() {
         let scene = textured(ground(2.0, 1), checker());
         let map = map_of(

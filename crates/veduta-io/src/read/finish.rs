@@ -36,7 +36,8 @@ pub(crate) fn finish_mesh(
         "those of the faces around are taken",
     );
     let mut count = 0;
-    for uv in mesh.texcoords.iter_mut().filter(|uv| !uv.is_finite()) {
+    let texcoords = mesh.texcoords.iter_mut().chain(&mut mesh.second_texcoords);
+    for uv in texcoords.filter(|uv| !uv.is_finite()) {
         *uv = Vec2::ZERO;
         count += 1;
     }
@@ -49,6 +50,12 @@ pub(crate) fn finish_mesh(
         }
     }
     mended("vertex colours are not finite", count, "white is taken");
+    let mut count = 0;
+    for opacity in mesh.opacities.iter_mut().filter(|a| !a.is_finite()) {
+        *opacity = 1.0;
+        count += 1;
+    }
+    mended("vertex opacities are not finite", count, "1 is taken");
     Ok(())
 }
 
@@ -98,6 +105,9 @@ pub(crate) fn turn_up(scene: &mut Scene, up: UpAxis) {
     for (_, camera) in &mut scene.cameras {
         // A rotation's inverse is its transpose, exactly.
         camera.eye_from_world *= world_from_file.transpose();
+    }
+    for light in &mut scene.lights {
+        light.world_from_light = world_from_file * light.world_from_light;
     }
 }
 

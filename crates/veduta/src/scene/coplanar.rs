@@ -4,14 +4,15 @@
 //! (z-fighting). Faces that lie in the plane of an earlier one, as far as their coordinates can tell,
 //! are given that face's plane; then the order of faces decides, everywhere alike.
 //!
-//! Planes are looked up in a hash table of quantised normals and distances. Most faces are alone in
-//! their slot, which a table of counters tells before anything is stored for them.
+//! Planes are looked up by quantised normal and distance. Most faces are alone in their slot, or with
+//! the other half of their quadrilateral, which cannot overlap them. A table of flags tells so in one
+//! pass over all faces; only the others are compared.
 
-use crate::scene::Scene;
+use crate::scene::{Mesh, Object, Scene};
 use rayon::prelude::*;
-use std::collections::HashMap;
-use std::sync::atomic::{AtomicU8, Ordering};
-use veduta_geometry::DVec3;
+use std::ops::Range;
+use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+use veduta_geometry::{DMat4, DVec3};
 
 /// Deviation from a plane, relative to the largest coordinate of a face, that counts as rounding:
 /// four units in the last place of single precision, in which most models are stored. More would
@@ -20,104 +21,159 @@ const ROUNDING: f64 = 4.0 * 0.5 / (1 << 23) as f64;
 
 /// Width of a slot: of a component of the unit normal, and of the distance from the origin as a share
 /// of the scene's extent.
-const NORMAL_SLOT: f64 = 1.0 / (1 << 12) as f64;
-const DISTANCE_SLOT: f64 = 1.0 / (1 << 14) as f64;
+const NORMAL_SLOT: f64 = 1.0 / (1 << 10) as f64;
+const DISTANCE_SLOT: f64 = 1.0 / (1 << 12) as f64;
+
+/// Faces whose plane rounding leaves open by more than this share of a slot are left alone.
+const SURE: f64 = 1.0 / 16.0;
 
 /// More than the number of slots on either side of zero: the distance of a plane is at most twice the
 /// scene's extent.
 const SHIFT: f64 = (1 << 20) as f64;
 
-/// Faces and vertices a task looks at at a time.
-const FACES_PER_TASK: usize = 16 * 1024;
+/// Flags for each face: with fewer, more faces are compared that only share a flag by chance.
+const CLAIMS_PER_FACE: usize = 16;
+
+/// Flags of a slot: that a face lies in it, that more than one does.
+const CLAIMED: u8 = 1;
+const CLAIMED_AGAIN: u8 = 2;
+
+/// The end of a list.
+const NO_MORE: u32 = u32::MAX;
+
+/// Faces and vertices a task looks at at a time; even, since halves of quadrilaterals go together.
+const FACES_PER_TASK: u32 = 16 * 1024;
 
 /// A face of the scene: index of its object, index in the object's mesh.
 pub type FaceIndex = (u32, u32);
 
-/// Pairs of a face and the first face of its plane, for planes with more than one face; ascending.
-///
-/// Faces so small that rounding leaves their normal open by more than a slot's width are left alone:
-/// nothing can be said of their plane.
-pub fn coplanar_faces(scene: &Scene) -> Vec<(FaceIndex, FaceIndex)> {
-    let positions: Vec<Vec<DVec3>> = scene
-        .objects
-        .iter()
-        .map(|object| {
-            let positions = &scene.meshes[object.mesh.0 as usize].positions;
-            let place = |&position: &DVec3| object.world_from_object.transform_point3(position);
-            positions
-                .par_iter()
-                .with_min_len(FACES_PER_TASK)
-                .map(place)
-                .collect()
-        })
-        .collect();
-    let largest = |points: &Vec<DVec3>| {
-        let sizes = points
-            .par_iter()
-            .with_min_len(FACES_PER_TASK)
-            .map(|p| p.abs().max_element());
-        sizes.reduce(|| 0.0, f64::max)
-    };
-    let extent = positions.iter().map(largest).fold(0.0, f64::max);
-    let slots = Slots {
-        distance: (extent * DISTANCE_SLOT).max(f64::MIN_POSITIVE),
-    };
-    let mut faces: Vec<(FaceIndex, Plane)> = Vec::new();
-    for (object, (placed, positions)) in scene.objects.iter().zip(&positions).enumerate() {
-        let triangles = &scene.meshes[placed.mesh.0 as usize].triangles;
-        let parts: Vec<Vec<(FaceIndex, Plane)>> = triangles
-            .par_chunks(FACES_PER_TASK)
-            .enumerate()
-            .map(|(chunk, triangles)| {
-                let first = chunk * FACES_PER_TASK;
-                let plane_of = |(face, triangle): (usize, &[u32; 3])| {
-                    let corners = triangle.map(|vertex| positions[vertex as usize]);
-                    let plane = Plane::of(corners, slots.distance)?;
-                    Some(((object as u32, (first + face) as u32), plane))
-                };
-                triangles.iter().enumerate().filter_map(plane_of).collect()
-            })
+/// Which faces of a scene share a plane. It depends on no camera, so that one serves all views.
+#[derive(Clone, Debug, Default)]
+pub struct PlaneGroups {
+    /// Pairs of a face and the first face of its plane, for planes with more than one face; ascending.
+    pairs: Vec<(FaceIndex, FaceIndex)>,
+}
+
+impl PlaneGroups {
+    /// Finds the faces that may overlap in one plane.
+    ///
+    /// Faces so small that rounding leaves their normal open by more than a slot's width are left
+    /// alone: nothing can be said of their plane.
+    pub fn of(scene: &Scene) -> Self {
+        let objects = scene.objects.iter();
+        let placed: Vec<PlacedMesh> = objects
+            .map(|object| PlacedMesh::new(scene, object))
             .collect();
-        faces.extend(parts.into_iter().flatten());
-    }
-    if faces.is_empty() {
-        return Vec::new();
+        let extent = placed.iter().map(PlacedMesh::extent).fold(0.0, f64::max);
+        let slots = Slots {
+            distance: (extent * DISTANCE_SLOT).max(f64::MIN_POSITIVE),
+        };
+        let contested = contested_faces(&placed, &slots);
+        let pairs = pairs_among(&placed, &slots, &contested);
+        Self { pairs }
     }
 
-    let counters: Vec<AtomicU8> = (0..(16 * faces.len()).next_power_of_two())
+    /// Pairs of a face and the first face of its plane, for planes with more than one face; ascending.
+    pub fn pairs(&self) -> &[(FaceIndex, FaceIndex)] {
+        &self.pairs
+    }
+
+    /// The pairs of an object's faces.
+    pub fn of_object(&self, object: u32) -> &[(FaceIndex, FaceIndex)] {
+        let start = self.pairs.partition_point(|pair| pair.0.0 < object);
+        let end = self.pairs.partition_point(|pair| pair.0.0 <= object);
+        &self.pairs[start..end]
+    }
+}
+
+/// The faces that are not alone in their slot, ascending; some by chance.
+fn contested_faces(placed: &[PlacedMesh], slots: &Slots) -> Vec<FaceIndex> {
+    let face_count: usize = placed.iter().map(|object| object.mesh.face_count()).sum();
+    let claims: Vec<AtomicU8> = (0..(CLAIMS_PER_FACE * face_count).next_power_of_two())
         .map(|_| AtomicU8::new(0))
         .collect();
-    let counter = |slot: &Slot| &counters[hash(slot) as usize & (counters.len() - 1)];
-    faces.par_iter().for_each(|(_, plane)| {
+    let claims_of = |slot: &Slot| &claims[hash(slot) as usize & (claims.len() - 1)];
+    let tasks: Vec<(u32, Range<u32>)> = placed
+        .iter()
+        .zip(0..)
+        .flat_map(|(object, index)| {
+            let count = object.mesh.face_count() as u32;
+            let starts = (0..count).step_by(FACES_PER_TASK as usize);
+            starts.map(move |start| (index, start..(start + FACES_PER_TASK).min(count)))
+        })
+        .collect();
+
+    tasks.par_iter().for_each(|(object, faces)| {
+        let claim = |_, plane: &Plane| {
+            slots.of(plane, |slot| {
+                let claims = claims_of(&slot);
+                if claims.load(Relaxed) & CLAIMED_AGAIN == 0
+                    && claims.fetch_or(CLAIMED, Relaxed) & CLAIMED != 0
+                {
+                    claims.fetch_or(CLAIMED_AGAIN, Relaxed);
+                }
+            });
+        };
+        placed[*object as usize].for_each_plane(faces.clone(), slots, claim);
+    });
+    let contested = tasks.par_iter().map(|(object, faces)| {
+        let mut contested = Vec::new();
+        let look = |faces: Range<u32>, plane: &Plane| {
+            let mut is_contested = false;
+            slots.of(plane, |slot| {
+                is_contested |= claims_of(&slot).load(Relaxed) & CLAIMED_AGAIN != 0;
+            });
+            if is_contested {
+                contested.extend(faces.map(|face| (*object, face)));
+            }
+        };
+        placed[*object as usize].for_each_plane(faces.clone(), slots, look);
+        contested
+    });
+    contested.collect::<Vec<_>>().concat()
+}
+
+/// Pairs of a face and the first face of its plane among `faces`, for planes with more than one face;
+/// ascending.
+fn pairs_among(
+    placed: &[PlacedMesh],
+    slots: &Slots,
+    faces: &[FaceIndex],
+) -> Vec<(FaceIndex, FaceIndex)> {
+    let planes: Vec<(FaceIndex, Plane)> = faces
+        .iter()
+        .filter_map(|&(object, face)| {
+            let plane = placed[object as usize].plane_of(face, slots)?;
+            Some(((object, face), plane))
+        })
+        .collect();
+    // First faces by slot, as lists: of each its row in `planes`, and the next of the list.
+    let mut heads = vec![NO_MORE; (4 * planes.len()).next_power_of_two()];
+    let last_head = heads.len() - 1;
+    let head_of = |slot: &Slot| hash(slot) as usize & last_head;
+    let mut lists: Vec<(u32, u32)> = Vec::new();
+    let mut pairs = Vec::new();
+    for (row, (face, plane)) in planes.iter().enumerate() {
+        let (object, index) = *face;
+        let mut first: Option<u32> = None;
         slots.of(plane, |slot| {
-            let counter = counter(&slot);
-            if counter.load(Ordering::Relaxed) < 2 {
-                counter.fetch_add(1, Ordering::Relaxed);
+            let mut at = heads[head_of(&slot)];
+            while at != NO_MORE {
+                let (other, next) = lists[at as usize];
+                let plane_of_other = &planes[other as usize].1;
+                if placed[object as usize].lies_in(index, plane, plane_of_other) {
+                    first = Some(first.map_or(other, |first| first.min(other)));
+                }
+                at = next;
             }
         });
-    });
-
-    let mut first_faces: HashMap<Slot, Vec<usize>> = HashMap::new();
-    let mut pairs = Vec::new();
-    for (index, (face, plane)) in faces.iter().enumerate() {
-        let mut is_alone = true;
-        slots.of(plane, |slot| {
-            is_alone &= counter(&slot).load(Ordering::Relaxed) < 2
-        });
-        if is_alone {
-            continue;
-        }
-        let mut first = None;
-        slots.of(plane, |slot| {
-            let here = first_faces.get(&slot).into_iter().flatten();
-            let found = here.copied().find(|&other| faces[other].1.contains(plane));
-            first = first.into_iter().chain(found).min();
-        });
         if let Some(first) = first {
-            pairs.push((*face, faces[first].0));
+            pairs.push((*face, planes[first as usize].0));
         } else {
             slots.of(plane, |slot| {
-                first_faces.entry(slot).or_default().push(index)
+                let head = &mut heads[head_of(&slot)];
+                lists.push((row as u32, *head));
+                *head = lists.len() as u32 - 1;
             });
         }
     }
@@ -130,9 +186,100 @@ pub fn coplanar_faces(scene: &Scene) -> Vec<(FaceIndex, FaceIndex)> {
     pairs
 }
 
+/// An object's mesh in the world.
+struct PlacedMesh<'a> {
+    mesh: &'a Mesh,
+    world_from_object: DMat4,
+}
+
+impl<'a> PlacedMesh<'a> {
+    fn new(scene: &'a Scene, object: &Object) -> Self {
+        Self {
+            mesh: &scene.meshes[object.mesh.0 as usize],
+            world_from_object: object.world_from_object,
+        }
+    }
+
+    fn position(&self, vertex: u32) -> DVec3 {
+        let position = self.mesh.positions[vertex as usize];
+        self.world_from_object.transform_point3(position)
+    }
+
+    /// The largest coordinate.
+    fn extent(&self) -> f64 {
+        let sizes = (0..self.mesh.positions.len() as u32)
+            .into_par_iter()
+            .with_min_len(FACES_PER_TASK as usize)
+            .map(|vertex| self.position(vertex).abs().max_element());
+        sizes.reduce(|| 0.0, f64::max)
+    }
+
+    fn plane_of(&self, face: u32, slots: &Slots) -> Option<Plane> {
+        let triangle = self.mesh.triangles[self.mesh.triangles_of(face).start];
+        Plane::of(triangle.map(|vertex| self.position(vertex)), slots)
+    }
+
+    /// The planes of `faces` that are sure; once for the two halves of a quadrilateral, which are one
+    /// after the other in most files.
+    fn for_each_plane(
+        &self,
+        faces: Range<u32>,
+        slots: &Slots,
+        mut visit: impl FnMut(Range<u32>, &Plane),
+    ) {
+        let mut next = faces.start;
+        while next < faces.end {
+            let face = next;
+            next += 1;
+            let Some(plane) = self.plane_of(face, slots) else {
+                continue;
+            };
+            if next < faces.end
+                && let Some(corner) = self.mesh.corner_beyond_shared_edge(face, next)
+                && plane.is_near(self.position(corner), plane.tolerance)
+            {
+                next += 1;
+            }
+            visit(face..next, &plane);
+        }
+    }
+
+    /// Whether all of a face, whose plane is `own`, lies in `plane`.
+    fn lies_in(&self, face: u32, own: &Plane, plane: &Plane) -> bool {
+        let tolerance = own.tolerance.max(plane.tolerance);
+        let mut corners = self.mesh.corners_of(face);
+        corners.all(|corner| plane.is_near(self.position(corner), tolerance))
+    }
+}
+
+impl Mesh {
+    /// The corner of the triangle `other` that lies across the edge that it shares with `face`, if both
+    /// are triangles with an edge in common, run through in opposite directions: then, in one plane,
+    /// they do not overlap. Vertices need not be shared: flat shading gives each face its own.
+    fn corner_beyond_shared_edge(&self, face: u32, other: u32) -> Option<u32> {
+        let [p, q, r] = self.only_triangle_of(face)?;
+        let [a, b, c] = self.only_triangle_of(other)?;
+        let is_same =
+            |a: u32, b: u32| a == b || self.positions[a as usize] == self.positions[b as usize];
+        for (from, to) in [(p, q), (q, r), (r, p)] {
+            for (start, end, corner) in [(a, b, c), (b, c, a), (c, a, b)] {
+                if is_same(from, end) && is_same(to, start) {
+                    return Some(corner);
+                }
+            }
+        }
+        None
+    }
+
+    fn only_triangle_of(&self, face: u32) -> Option<[u32; 3]> {
+        let range = self.triangles_of(face);
+        (range.len() == 1).then(|| self.triangles[range.start])
+    }
+}
+
 /// A face's plane, and how sure it is.
 struct Plane {
-    corners: [DVec3; 3],
+    origin: DVec3,
     normal: DVec3,
     distance: f64,
     /// How far a point may lie off the plane by rounding.
@@ -143,7 +290,7 @@ struct Plane {
 }
 
 impl Plane {
-    fn of(corners: [DVec3; 3], distance_slot: f64) -> Option<Self> {
+    fn of(corners: [DVec3; 3], slots: &Slots) -> Option<Self> {
         let [p, q, r] = corners;
         let (u, v) = (q - p, r - p);
         let cross = u.cross(v);
@@ -154,14 +301,14 @@ impl Plane {
         let largest = p.abs().max(q.abs()).max(r.abs()).max_element();
         let tolerance = ROUNDING * largest;
         // What fine meshes are made of is told without a root.
-        let unsure = 16.0 * tolerance * tolerance * longest_squared;
-        if unsure >= NORMAL_SLOT * NORMAL_SLOT * cross.length_squared() {
+        let most = SURE * NORMAL_SLOT;
+        if tolerance * tolerance * longest_squared >= most * most * cross.length_squared() {
             return None;
         }
         let twice_area = cross.length();
         let normal_tolerance = tolerance * longest_squared.sqrt() / twice_area;
         let distance_tolerance = tolerance + normal_tolerance * largest;
-        if 4.0 * distance_tolerance >= distance_slot {
+        if distance_tolerance >= SURE * slots.distance {
             return None;
         }
         // Of the two normals the one whose largest component is positive.
@@ -175,24 +322,18 @@ impl Plane {
         } else {
             normal
         };
-        let distance = normal.dot(p);
         Some(Self {
-            corners,
+            origin: p,
             normal,
-            distance,
+            distance: normal.dot(p),
             tolerance,
             normal_tolerance,
             distance_tolerance,
         })
     }
 
-    /// Whether all of `other` lies in this plane.
-    fn contains(&self, other: &Plane) -> bool {
-        let tolerance = self.tolerance.max(other.tolerance);
-        other
-            .corners
-            .iter()
-            .all(|&corner| (self.normal.dot(corner - self.corners[0])).abs() <= tolerance)
+    fn is_near(&self, point: DVec3, tolerance: f64) -> bool {
+        self.normal.dot(point - self.origin).abs() <= tolerance
     }
 }
 
@@ -289,6 +430,10 @@ mod tests {
         scene
     }
 
+    fn pairs(scene: &Scene) -> Vec<(FaceIndex, FaceIndex)> {
+        PlaneGroups::of(scene).pairs().to_vec()
+    }
+
     fn tilted(offset: f64) -> DMat4 {
         let turn = DQuat::from_axis_angle(DVec3::new(0.3, 1.0, 0.2).normalize(), 0.7);
         DMat4::from_rotation_translation(
@@ -299,15 +444,15 @@ mod tests {
 
     #[test]
     fn two_tessellations_of_a_tilted_square_share_one_plane() {
-        let pairs = coplanar_faces(&scene(&[(3, tilted(0.0)), (5, tilted(0.0))]));
+        let pairs = pairs(&scene(&[(3, tilted(0.0)), (5, tilted(0.0))]));
         assert_eq!(pairs.len(), 2 * (9 + 25));
         assert!(pairs.iter().all(|pair| pair.1 == (0, 0)), "{pairs:?}");
     }
 
     #[test]
     fn a_sheet_a_millimetre_above_another_has_its_own_plane() {
-        let pairs = coplanar_faces(&scene(&[(1, tilted(0.0)), (1, tilted(0.001))]));
-        assert!(pairs.iter().all(|pair| pair.0.0 == pair.1.0), "{pairs:?}");
+        let pairs = pairs(&scene(&[(1, tilted(0.0)), (1, tilted(0.001))]));
+        assert!(pairs.is_empty(), "{pairs:?}");
     }
 
     #[test]
@@ -316,6 +461,30 @@ mod tests {
         for mesh in &mut scene.meshes {
             mesh.triangles.truncate(1);
         }
-        assert!(coplanar_faces(&scene).is_empty());
+        assert!(pairs(&scene).is_empty());
+    }
+
+    #[test]
+    fn two_halves_of_a_square_need_no_common_plane_but_a_decal_on_them_does() {
+        let halves = scene(&[(1, tilted(0.0))]);
+        assert_eq!(pairs(&halves), []);
+        let with_decal = scene(&[
+            (1, tilted(0.0)),
+            (1, tilted(0.0) * DMat4::from_scale(DVec3::splat(0.5))),
+        ]);
+        assert_eq!(pairs(&with_decal).len(), 4);
+        let twice = scene(&[(1, tilted(0.0)), (1, tilted(0.0))]);
+        assert_eq!(pairs(&twice).len(), 4);
+    }
+
+    #[test]
+    fn a_polygon_shares_its_plane_with_triangles_that_lie_in_it() {
+        let mut scene = scene(&[(1, tilted(0.0)), (2, tilted(0.0))]);
+        let mesh = &mut scene.meshes[0];
+        mesh.triangles.clear();
+        mesh.push_polygon(&[0, 1, 3, 2]);
+        let pairs = pairs(&scene);
+        assert_eq!(pairs.len(), 1 + 8);
+        assert!(pairs.iter().all(|pair| pair.1 == (0, 0)), "{pairs:?}");
     }
 }

@@ -10,8 +10,10 @@ pub struct Material {
     pub base_color: [f32; 4],
     /// Picture of the colour (sRGB) and opacity.
     pub base_color_texture: Option<TextureRef>,
-    /// Radiance it gives off by itself.
+    /// Radiance it gives off by itself, multiplied with the emissive texture.
     pub emissive: [f32; 3],
+    /// Picture of the radiance (sRGB); its opacity means nothing.
+    pub emissive_texture: Option<TextureRef>,
     /// What opacity means.
     pub alpha_mode: AlphaMode,
     /// Seen from both sides; otherwise faces turned away from the eye are left out.
@@ -28,6 +30,7 @@ impl Default for Material {
             base_color: [0.6, 0.6, 0.6, 1.0],
             base_color_texture: None,
             emissive: [0.0; 3],
+            emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,
             double_sided: true,
             unlit: false,
@@ -52,6 +55,8 @@ pub enum AlphaMode {
 pub struct TextureRef {
     /// The picture.
     pub image: ImageId,
+    /// The texture coordinates that place it.
+    pub texcoords: TexcoordSet,
     /// What lies outside the unit square, along u and v.
     pub wrap: [Wrap; 2],
     /// Picture coordinates are `offset + rotation(scale * uv)` (KHR_texture_transform).
@@ -63,16 +68,27 @@ pub struct TextureRef {
 }
 
 impl TextureRef {
-    /// The picture as it is, repeated.
+    /// The picture as it is, placed by the first texture coordinates, repeated.
     pub fn new(image: ImageId) -> Self {
         Self {
             image,
+            texcoords: TexcoordSet::First,
             wrap: [Wrap::Repeat; 2],
             offset: Vec2::ZERO,
             rotation: 0.0,
             scale: Vec2::ONE,
         }
     }
+}
+
+/// One of a mesh's tables of texture coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TexcoordSet {
+    /// [`Mesh::texcoords`](crate::scene::Mesh::texcoords).
+    #[default]
+    First,
+    /// [`Mesh::second_texcoords`](crate::scene::Mesh::second_texcoords).
+    Second,
 }
 
 /// What lies outside a texture's unit square.

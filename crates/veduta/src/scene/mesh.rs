@@ -1,3 +1,4 @@
+use crate::scene::TexcoordSet;
 use std::ops::Range;
 use veduta_geometry::{DVec3, Vec2, Vec3};
 use veduta_map::MaterialId;
@@ -25,8 +26,13 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, (0, 0) at the top left of the picture (as in glTF); may be empty.
     pub texcoords: Vec<Vec2>,
+    /// A second set of texture coordinates, for textures that ask for it
+    /// ([`TexcoordSet::Second`]); may be empty.
+    pub second_texcoords: Vec<Vec2>,
     /// Linear RGB factors of the material's colour; may be empty.
     pub colors: Vec<[f32; 3]>,
+    /// Factors of the material's opacity; empty where all are 1.
+    pub opacities: Vec<f32>,
     /// `(first face, material)`, ascending from face 0: each material holds up to the next row.
     pub materials: Vec<(u32, MaterialId)>,
 }
@@ -149,6 +155,14 @@ impl Mesh {
         }
     }
 
+    /// The texture coordinates of a set; may be empty.
+    pub fn texcoords_of(&self, set: TexcoordSet) -> &[Vec2] {
+        match set {
+            TexcoordSet::First => &self.texcoords,
+            TexcoordSet::Second => &self.second_texcoords,
+        }
+    }
+
     /// The material of a face.
     pub fn material_of(&self, face: u32) -> MaterialId {
         let after = self.materials.partition_point(|range| range.0 <= face);
@@ -180,7 +194,9 @@ impl Mesh {
         for (attribute, found) in [
             ("normals", self.normals.len()),
             ("texture coordinates", self.texcoords.len()),
+            ("second texture coordinates", self.second_texcoords.len()),
             ("colours", self.colors.len()),
+            ("opacities", self.opacities.len()),
         ] {
             if found != 0 && found != vertices {
                 return Err(MeshError::AttributeLength {

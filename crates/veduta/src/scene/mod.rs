@@ -1,4 +1,4 @@
-//! What is to be shown: objects made of meshes, their materials, the cameras.
+//! What is to be shown: objects made of meshes, their materials, the cameras and lights.
 //!
 //! World space is right-handed with Z up, in metres. Readers of foreign files turn what they read
 //! to this, through [`Object::world_from_object`].
@@ -6,13 +6,15 @@
 mod coplanar;
 mod framing;
 pub mod generate;
+mod light;
 mod material;
 mod mesh;
 mod world;
 
-pub use coplanar::{FaceIndex, coplanar_faces};
+pub use coplanar::{FaceIndex, PlaneGroups};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
-pub use material::{AlphaMode, Image, Material, TextureRef, Wrap};
+pub use light::{Light, LightKind};
+pub use material::{AlphaMode, Image, Material, TexcoordSet, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError};
 pub use world::{Layer, World};
 
@@ -54,6 +56,8 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Named cameras that came with the model.
     pub cameras: Vec<(String, Camera)>,
+    /// Lights that came with the model. Pictures do not show them yet; see `shade`.
+    pub lights: Vec<Light>,
     /// What layers the objects are of, in the order of the objects; empty where there is one only.
     pub layers: Vec<Layer>,
     /// Where on Earth the scene is.

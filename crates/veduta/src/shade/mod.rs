@@ -10,19 +10,19 @@
 //! 2. Pyramids of the pictures in use are made (`texture.rs`).
 //! 3. [`Surfaces::shade`] evaluates the parts of a band.
 //!
-//! The light is a stand-in, a sun and a plain sky ([`light`]), until scenes bring theirs. Opacity is
-//! not looked at: all that is diced is opaque.
+//! The light is a stand-in, a sun and a plain sky ([`light`]); those of the scene
+//! ([`Scene::lights`]) are not looked at. Nor is opacity: all that is diced is opaque.
 
 pub mod light;
 mod surface;
 mod texture;
 
 use crate::dice::{Parts, PixelGrid};
-use crate::scene::{ImageId, Material, Scene};
+use crate::scene::{ImageId, Material, Scene, TextureRef};
 use light::Daylight;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use surface::{Surface, SurfacePoint, Varying, Viewer};
+use surface::{PicturePoint, Surface, SurfacePoint, Varying, Viewer};
 use texture::Pyramid;
 use veduta_geometry::{DVec2, Vec3};
 use veduta_map::{FaceId, VisibilityMap};
@@ -96,7 +96,11 @@ impl<'a> Surfaces<'a> {
         let varying: Vec<Varying> = faces.par_iter().map(|&face| viewer.varying(face)).collect();
         let images: BTreeSet<ImageId> = varying
             .iter()
-            .filter_map(|face| scene.material(face.material).base_color_texture)
+            .flat_map(|face| {
+                let material = scene.material(face.material);
+                [material.base_color_texture, material.emissive_texture]
+            })
+            .flatten()
             .map(|texture| texture.image)
             .collect();
         let pyramids = (0..scene.images.len())
@@ -163,7 +167,7 @@ impl<'a> Surfaces<'a> {
         let radiance = if self.unlit || material.unlit {
             color
         } else {
-            color * self.light.on(point.normal) + Vec3::from(material.emissive)
+            color * self.light.on(point.normal) + self.emission(material, &point, grid)
         };
         radiance.into()
     }
@@ -172,9 +176,23 @@ impl<'a> Surfaces<'a> {
     fn color(&self, material: &Material, point: &SurfacePoint, grid: &PixelGrid) -> Vec3 {
         let [r, g, b, _] = material.base_color;
         let color = Vec3::new(r, g, b) * point.color;
-        let (Some(texture), Some(place)) = (material.base_color_texture, point.picture) else {
-            return color;
-        };
+        match (material.base_color_texture, &point.picture) {
+            (Some(texture), Some(place)) => color * self.texel(&texture, place, grid),
+            _ => color,
+        }
+    }
+
+    /// What the material gives off at a point: its own radiance, times the texture's.
+    fn emission(&self, material: &Material, point: &SurfacePoint, grid: &PixelGrid) -> Vec3 {
+        let emission = Vec3::from(material.emissive);
+        match (material.emissive_texture, &point.emissive_picture) {
+            (Some(texture), Some(place)) => emission * self.texel(&texture, place, grid),
+            _ => emission,
+        }
+    }
+
+    /// Mean colour of a texture in the footprint of a pixel.
+    fn texel(&self, texture: &TextureRef, place: &PicturePoint, grid: &PixelGrid) -> Vec3 {
         let pyramid = self.pyramids[texture.image.0 as usize]
             .as_ref()
             .expect("pyramids of all pictures in use are made");
@@ -185,6 +203,6 @@ impl<'a> Surfaces<'a> {
             place.along_y / pixel.y,
             texture.wrap,
         );
-        color * texel.truncate()
+        texel.truncate()
     }
 }

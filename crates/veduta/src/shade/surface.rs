@@ -1,6 +1,6 @@
 //! What a face looks like from the eye, made ready for evaluation at any point of it.
 
-use crate::scene::{Material, Scene};
+use crate::scene::{Material, Scene, TextureRef};
 use crate::shade::light::Daylight;
 use crate::shade::texture::picture_from_uv;
 use veduta_geometry::{DMat3, DMat4, DVec2, DVec3, Vec3};
@@ -24,8 +24,10 @@ pub struct Varying {
     face_normal: Vec3,
     /// At the corners, in world space; not normalised.
     normals: Option<[Vec3; 3]>,
-    /// Picture coordinates at the corners.
+    /// Coordinates at the corners in the picture of the colour.
     picture: Option<[DVec2; 3]>,
+    /// Those in the picture of the emission; boxed because few faces have one.
+    emissive_picture: Option<Box<[DVec2; 3]>>,
     colors: Option<[Vec3; 3]>,
 }
 
@@ -36,8 +38,10 @@ pub struct SurfacePoint {
     pub normal: Vec3,
     /// Factor of the material's colour.
     pub color: Vec3,
-    /// Place in the texture, if there is one.
+    /// Place in the texture of the colour, if there is one.
     pub picture: Option<PicturePoint>,
+    /// Place in the texture of the emission, if there is one.
+    pub emissive_picture: Option<PicturePoint>,
 }
 
 /// A place in a texture and the footprint of a pixel there.
@@ -52,16 +56,21 @@ pub struct PicturePoint {
 }
 
 /// Barycentric coordinates of a triangle, as functions of the image plane, up to a common factor.
+/// Those of the first triangle of a larger face serve all of it.
 ///
 /// In perspective a point on the ray with direction d, z = 1, is `z d = Σ w_i V_i`, so that
 /// `w / z = [V0 V1 V2]⁻¹ d`: these are affine in the image plane, since d is, and their sum is 1/z.
 /// In parallel projection the coordinates themselves are affine. That holds for corners behind
 /// the eye, too, so a face that the near plane cut needs no other corners.
 #[derive(Clone, Copy, Debug)]
-struct Corners([Affine; 3]);
+struct Corners {
+    weights: [Affine; 3],
+    /// No weight is less on the face: zero on a triangle.
+    least: f64,
+}
 
 impl Corners {
-    fn new(camera: &Camera, corners: [DVec3; 3]) -> Self {
+    fn new(camera: &Camera, corners: [DVec3; 3], is_triangle: bool) -> Self {
         let (scale, ahead) = (camera.image_scale(), camera.principal_point());
         let [v0, v1, v2] = corners;
         // Each row c is a function c · (X, Y, 1) with X = (x - ahead.x) / scale.x, Y likewise.
@@ -77,10 +86,12 @@ impl Corners {
                 (rows, f0.dot(rows[0]))
             }
         };
-        Self(rows.map(|row| {
+        let weights = rows.map(|row| {
             let (a, b) = (row.x / scale.x / whole, row.y / scale.y / whole);
             Affine::new(a, b, row.z / whole - (a * ahead.x + b * ahead.y))
-        }))
+        });
+        let least = if is_triangle { 0.0 } else { f64::NEG_INFINITY };
+        Self { weights, least }
     }
 
     /// Barycentric coordinates at an image point, and their sum's inverse (the depth).
@@ -90,7 +101,7 @@ impl Corners {
     /// middle.
     #[inline]
     fn at(&self, image: DVec2) -> ([f64; 3], f64) {
-        let weights = self.0.map(|weight| weight.at(image).max(0.0));
+        let weights = self.weights.map(|weight| weight.at(image).max(self.least));
         let sum: f64 = weights.iter().sum();
         if sum > 0.0 && sum.is_finite() {
             let depth = 1.0 / sum;
@@ -145,16 +156,21 @@ impl<'a> Viewer<'a> {
         let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = self.scene.material_of(object, source);
-        if material.base_color_texture.is_some() && !mesh.texcoords.is_empty() {
+        let lit = self.lit(material);
+        let emissive_texture = material.emissive_texture.filter(|_| lit);
+        let textures = [material.base_color_texture, emissive_texture];
+        let placed = |texture: &TextureRef| !mesh.texcoords_of(texture.texcoords).is_empty();
+        if textures.iter().flatten().any(placed) {
             return None;
         }
-        let corners = mesh.triangles[source as usize].map(|corner| corner as usize);
+        let triangles = mesh.triangles_of(source);
+        let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
         let [r, g, b, _] = material.base_color;
         let mut color = Vec3::new(r, g, b);
         if !mesh.colors.is_empty() {
             color *= Vec3::from(all_equal(corners.map(|corner| mesh.colors[corner]))?);
         }
-        if !self.lit(material) {
+        if !lit {
             return Some(color.into());
         }
         let face_normal = self.face_normal(&self.eye_corners(object, source));
@@ -174,14 +190,21 @@ impl<'a> Viewer<'a> {
         let (object, source) = (self.map.faces.object(face), self.map.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = mesh.material_of(source);
-        let texture = self.scene.material(material).base_color_texture;
-        let corners = mesh.triangles[source as usize].map(|corner| corner as usize);
+        let textures = self.scene.material(material);
+        let triangles = mesh.triangles_of(source);
+        let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
         let eye_corners = self.eye_corners(object, source);
         let turn = &self.objects[object.index()].world_normal_from_object;
         let has = |rows: usize| (rows > 0).then_some(corners);
+        let picture = |texture: Option<TextureRef>| {
+            let texture = texture?;
+            let texcoords = mesh.texcoords_of(texture.texcoords);
+            let corners = has(texcoords.len())?;
+            Some(corners.map(|corner| picture_from_uv(&texture, texcoords[corner])))
+        };
         Varying {
             material,
-            corners: Corners::new(&self.map.camera, eye_corners),
+            corners: Corners::new(&self.map.camera, eye_corners, triangles.len() == 1),
             face_normal: self.face_normal(&eye_corners),
             normals: has(mesh.normals.len()).map(|corners| {
                 // Normalised here: an object scaled unequally would weigh its corners otherwise.
@@ -191,20 +214,18 @@ impl<'a> Viewer<'a> {
                         .as_vec3()
                 })
             }),
-            picture: texture
-                .zip(has(mesh.texcoords.len()))
-                .map(|(texture, corners)| {
-                    corners.map(|corner| picture_from_uv(&texture, mesh.texcoords[corner]))
-                }),
+            picture: picture(textures.base_color_texture),
+            emissive_picture: picture(textures.emissive_texture).map(Box::new),
             colors: has(mesh.colors.len())
                 .map(|corners| corners.map(|corner| Vec3::from(mesh.colors[corner]))),
         }
     }
 
+    /// Corners of the face that span it: all three of a triangle.
     fn eye_corners(&self, object: ObjectId, source: u32) -> [DVec3; 3] {
         let mesh = self.scene.mesh_of(object);
         let eye_from_object = &self.objects[object.index()].eye_from_object;
-        mesh.triangles[source as usize]
+        mesh.triangles[mesh.triangles_of(source).start]
             .map(|corner| eye_from_object.transform_point3(mesh.positions[corner as usize]))
     }
 
@@ -246,25 +267,26 @@ impl Varying {
     pub fn at(&self, image: DVec2) -> SurfacePoint {
         let ([w0, w1, w2], depth) = self.corners.at(image);
         let mean = |[a, b, c]: [Vec3; 3]| a * w0 as f32 + b * w1 as f32 + c * w2 as f32;
+        let place = |&[p, q, r]: &[DVec2; 3]| {
+            let at = p * w0 + q * w1 + r * w2;
+            // Quotient rule: at = Σ p_i b_i / Σ b_i, with affine b_i.
+            let [b0, b1, b2] = self.corners.weights;
+            let along =
+                |d0: f64, d1: f64, d2: f64| ((p - at) * d0 + (q - at) * d1 + (r - at) * d2) * depth;
+            PicturePoint {
+                at,
+                along_x: along(b0.a, b1.a, b2.a),
+                along_y: along(b0.b, b1.b, b2.b),
+            }
+        };
         SurfacePoint {
             normal: match self.normals {
                 Some(normals) => on_side_of(mean(normals), self.face_normal),
                 None => self.face_normal,
             },
             color: self.colors.map_or(Vec3::ONE, mean),
-            picture: self.picture.map(|[p, q, r]| {
-                let at = p * w0 + q * w1 + r * w2;
-                // Quotient rule: at = Σ p_i b_i / Σ b_i, with affine b_i.
-                let [b0, b1, b2] = self.corners.0;
-                let along = |d0: f64, d1: f64, d2: f64| {
-                    ((p - at) * d0 + (q - at) * d1 + (r - at) * d2) * depth
-                };
-                PicturePoint {
-                    at,
-                    along_x: along(b0.a, b1.a, b2.a),
-                    along_y: along(b0.b, b1.b, b2.b),
-                }
-            }),
+            picture: self.picture.as_ref().map(place),
+            emissive_picture: self.emissive_picture.as_deref().map(place),
         }
     }
 }
@@ -305,7 +327,7 @@ mod tests {
         for projection in BOTH {
             let camera = camera(projection);
             for triangle in triangles() {
-                let corners = Corners::new(&camera, triangle);
+                let corners = Corners::new(&camera, triangle, true);
                 for expected in [[0.2, 0.5, 0.3], [0.9, 0.05, 0.05], [0.6, 0.35, 0.05]] {
                     let [v0, v1, v2] = triangle;
                     let point = v0 * expected[0] + v1 * expected[1] + v2 * expected[2];
@@ -325,10 +347,11 @@ mod tests {
             for triangle in triangles() {
                 let face = Varying {
                     material: MaterialId(0),
-                    corners: Corners::new(&camera, triangle),
+                    corners: Corners::new(&camera, triangle, true),
                     face_normal: -Vec3::Z,
                     normals: None,
                     picture: Some([(0.0, 0.3), (1.0, 0.1), (0.4, 2.0)].map(DVec2::from)),
+                    emissive_picture: None,
                     colors: None,
                 };
                 let at = |p| face.at(p).picture.expect("it has a texture");
@@ -346,7 +369,8 @@ mod tests {
     fn a_triangle_seen_edge_on_is_evaluated_in_its_middle() {
         for projection in BOTH {
             let line = [0.0, 1.0, 2.0].map(|t| DVec3::new(t, t, 1.0));
-            let (weights, _) = Corners::new(&camera(projection), line).at(DVec2::new(0.2, 0.7));
+            let (weights, _) =
+                Corners::new(&camera(projection), line, true).at(DVec2::new(0.2, 0.7));
             assert_eq!(weights, [1.0 / 3.0; 3]);
         }
     }

@@ -10,7 +10,7 @@
 //! Neighbours keep bit-equal edges: an edge is clipped from the smaller of its end points, whichever
 //! face asks.
 
-use crate::scene::{FaceIndex, Mesh, Object, Scene, coplanar_faces};
+use crate::scene::{FaceIndex, Mesh, Object, PlaneGroups, Scene};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use veduta_geometry::{DVec2, DVec3, DVec4, signed_area};
@@ -24,7 +24,7 @@ const FACES_PER_TASK: usize = 16 * 1024;
 /// Faces turned away from the eye are left out where their material is single-sided. Ids ascend by
 /// object, then by face within the object.
 pub fn project(scene: &Scene, camera: &Camera) -> Faces {
-    let coplanar = coplanar_faces(scene);
+    let groups = PlaneGroups::of(scene);
     let mut faces = Faces::new();
     for (index, object) in scene.objects.iter().enumerate() {
         let mesh = &scene.meshes[object.mesh.0 as usize];
@@ -33,23 +33,20 @@ pub fn project(scene: &Scene, camera: &Camera) -> Faces {
             continue;
         }
         let object = ObjectId::from_index(index);
-        let of_object = |pair: &(FaceIndex, FaceIndex)| pair.0.0 == object.0;
-        let first = coplanar.partition_point(|pair| pair.0.0 < object.0);
-        let groups = &coplanar[first..];
-        let groups = &groups[..groups.iter().take_while(|pair| of_object(pair)).count()];
-        let starts: Vec<usize> = (0..mesh.triangles.len()).step_by(FACES_PER_TASK).collect();
+        let groups = groups.of_object(object.0);
+        let starts: Vec<usize> = (0..mesh.face_count()).step_by(FACES_PER_TASK).collect();
         let parts: Vec<Faces> = starts
             .into_par_iter()
             .map(|start| {
-                let end = (start + FACES_PER_TASK).min(mesh.triangles.len());
-                view.project_faces(scene, object, start..end, groups)
+                let end = (start + FACES_PER_TASK).min(mesh.face_count());
+                view.project_faces(scene, object, start as u32..end as u32, groups)
             })
             .collect();
         for part in &parts {
             faces.append(part);
         }
     }
-    share_planes(&mut faces, &coplanar);
+    share_planes(&mut faces, groups.pairs());
     faces
 }
 
@@ -151,66 +148,67 @@ impl<'a> ObjectView<'a> {
         &self,
         scene: &Scene,
         object: ObjectId,
-        range: std::ops::Range<usize>,
+        range: std::ops::Range<u32>,
         groups: &[(FaceIndex, FaceIndex)],
     ) -> Faces {
         let mut faces = Faces::with_capacity(range.len());
+        let mut outline = Vec::new();
         let mut polygon = ClipPolygon::default();
         for source in range {
-            let corners = self.mesh.triangles[source].map(|vertex| vertex as usize);
-            let class = self.class_of(corners);
+            let corners = || self.mesh.corners_of(source).map(|vertex| vertex as usize);
+            let class = self.class_of(corners());
             if class == Class::Outside {
                 continue;
             }
             let outline: &[DVec2] = if class == Class::Inside {
-                &corners.map(|vertex| self.image[vertex])
+                outline.clear();
+                outline.extend(corners().map(|vertex| self.image[vertex]));
+                &outline
             } else {
-                polygon.clip(corners.map(|vertex| self.eye[vertex]), self.camera)
+                polygon.clip(corners().map(|vertex| self.eye[vertex]), self.camera)
             };
             let area = signed_area(outline);
             // Counterclockwise in the world is negative in an image plane whose y points down.
             let front = (area < 0.0) != self.mirrored;
-            if area == 0.0
-                || !front
-                    && !scene
-                        .material(self.mesh.material_of(source as u32))
-                        .double_sided
+            if area == 0.0 || !front && !scene.material(self.mesh.material_of(source)).double_sided
             {
                 continue;
             }
-            let group = groups.binary_search_by_key(&source, |pair| pair.0.1 as usize);
+            let group = groups.binary_search_by_key(&source, |pair| pair.0.1);
             let [p, q, r] = match group {
-                Ok(at) => self.eye_corners(scene, groups[at].1),
-                Err(_) => corners.map(|vertex| self.eye[vertex]),
+                Ok(at) => self.spanning_corners(scene, groups[at].1),
+                Err(_) => {
+                    let triangle = self.mesh.triangles[self.mesh.triangles_of(source).start];
+                    triangle.map(|vertex| self.eye[vertex as usize])
+                }
             };
             if let Some(nearness) = self.camera.nearness_of_plane(p, (q - p).cross(r - p)) {
                 let plane = faces.push_plane(nearness);
-                faces.push(outline, plane, object, source as u32);
+                faces.push(outline, plane, object, source);
             }
         }
         faces
     }
 
-    /// Eye-space corners of a face of any object, the same to the bit whoever asks.
-    fn eye_corners(&self, scene: &Scene, (object, face): FaceIndex) -> [DVec3; 3] {
+    /// Eye-space corners that span the plane of a face of any object, the same to the bit whoever
+    /// asks.
+    fn spanning_corners(&self, scene: &Scene, (object, face): FaceIndex) -> [DVec3; 3] {
         let object = ObjectId(object);
         let eye_from_object = self.camera.eye_from_world * scene.object(object).world_from_object;
         let mesh = scene.mesh_of(object);
-        mesh.triangles[face as usize]
+        mesh.triangles[mesh.triangles_of(face).start]
             .map(|vertex| eye_from_object.transform_point3(mesh.positions[vertex as usize]))
     }
 
-    fn class_of(&self, corners: [usize; 3]) -> Class {
+    fn class_of(&self, corners: impl Iterator<Item = usize>) -> Class {
         if self.outcodes.is_empty() {
             return Class::Inside;
         }
-        let [p, q, r] = corners.map(|vertex| self.outcodes[vertex]);
-        if p | q | r == 0 {
-            Class::Inside
-        } else if p & q & r == 0 {
-            Class::Partly
-        } else {
-            Class::Outside
+        let codes = corners.map(|vertex| self.outcodes[vertex]);
+        match codes.fold((0, u8::MAX), |(any, all), code| (any | code, all & code)) {
+            (0, _) => Class::Inside,
+            (_, 0) => Class::Partly,
+            _ => Class::Outside,
         }
     }
 }
@@ -241,7 +239,7 @@ fn image_from_homogeneous(point: DVec4) -> DVec2 {
     DVec2::new(point.x / point.z, point.y / point.z)
 }
 
-/// A triangle clipped to the view pyramid; reused from face to face to spare allocations.
+/// A face clipped to the view pyramid; reused from face to face to spare allocations.
 #[derive(Default)]
 struct ClipPolygon {
     corners: Vec<DVec4>,
@@ -250,11 +248,11 @@ struct ClipPolygon {
 }
 
 impl ClipPolygon {
-    /// The part of the triangle inside the view pyramid; fewer than three vertices if none is.
-    fn clip(&mut self, triangle: [DVec3; 3], camera: &Camera) -> &[DVec2] {
+    /// The part of the face inside the view pyramid; fewer than three vertices if none is.
+    fn clip(&mut self, corners: impl Iterator<Item = DVec3>, camera: &Camera) -> &[DVec2] {
         self.corners.clear();
         self.corners
-            .extend(triangle.map(|point| homogeneous(camera, point)));
+            .extend(corners.map(|point| homogeneous(camera, point)));
         // Near first: what is left has positive w, so that the sides mean what they say.
         self.clip_side(|p| p.w - camera.near, |p| p);
         // Points on a side of the frame get its coordinate exactly.
