@@ -84,7 +84,8 @@ impl Inclusion {
         let of_mesh = |mesh: &Mesh| {
             24 * mesh.positions.len()
                 + 12 * (mesh.triangles.len() + mesh.normals.len() + mesh.colors.len())
-                + 8 * mesh.texcoords.len()
+                + 8 * (mesh.texcoords.len() + mesh.second_texcoords.len())
+                + 4 * mesh.opacities.len()
         };
         let of_object = |object: &Object| size_of::<Object>() + object.name.len();
         let bytes = LOAD_COST

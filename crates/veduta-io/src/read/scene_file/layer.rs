@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use veduta::geometry::{DMat4, DQuat, DVec3};
 use veduta::map::{Camera, MaterialId, Projection};
-use veduta::scene::{ImageId, MeshId, Object, Scene};
+use veduta::scene::{ImageId, Light, MeshId, Object, Scene};
 
 /// A layer whose files are there.
 #[derive(Debug)]
@@ -166,6 +166,7 @@ pub fn append(
         materials,
         images,
         cameras,
+        lights,
         layers: _,
         world: _,
     } = part.loaded.scene;
@@ -177,7 +178,11 @@ pub fn append(
         .materials
         .extend(materials.into_iter().map(|mut material| {
             material.name = prefixed(layer.name, &material.name);
-            if let Some(texture) = &mut material.base_color_texture {
+            let textures = [
+                &mut material.base_color_texture,
+                &mut material.emissive_texture,
+            ];
+            for texture in textures.into_iter().flatten() {
                 texture.image = ImageId(first_image + texture.image.0);
             }
             material
@@ -189,6 +194,12 @@ pub fn append(
         mesh
     }));
 
+    let mut charge = |bytes: usize| {
+        inclusion.charge(1, bytes).map_err(|problem| {
+            let table = layer.instances.as_ref().map(|(_, span)| span);
+            source.error(table.unwrap_or(&layer.model_span).clone(), problem)
+        })
+    };
     for (instance, place) in &part.places {
         let prefix = match instance {
             None => layer.name.to_owned(),
@@ -196,15 +207,20 @@ pub fn append(
         };
         for object in &objects {
             let name = prefixed(&prefix, &object.name);
-            let charged = inclusion.charge(1, size_of::<Object>() + name.len());
-            charged.map_err(|problem| {
-                let table = layer.instances.as_ref().map(|(_, span)| span);
-                source.error(table.unwrap_or(&layer.model_span).clone(), problem)
-            })?;
+            charge(size_of::<Object>() + name.len())?;
             scene.objects.push(Object {
                 name,
                 mesh: MeshId((first_mesh + object.mesh.0 as usize) as u32),
                 world_from_object: *place * object.world_from_object,
+            });
+        }
+        for light in &lights {
+            let name = prefixed(&prefix, &light.name);
+            charge(size_of::<Light>() + name.len())?;
+            scene.lights.push(Light {
+                name,
+                world_from_light: moved_light(&light.world_from_light, place),
+                ..light.clone()
             });
         }
     }
@@ -276,9 +292,53 @@ fn moved(camera: &Camera, world_from_model: &DMat4) -> Option<Camera> {
     is_sound.then_some(camera)
 }
 
+/// The rigid motion of a light of a model that is placed in the world.
+///
+/// Scale moves a light but does not change it (KHR_lights_punctual): what it sends out is in absolute
+/// units.
+fn moved_light(model_from_light: &DMat4, world_from_model: &DMat4) -> DMat4 {
+    let world_from_light = *world_from_model * *model_from_light;
+    // The light shines along its -Z, so that axis is kept and the others are set upright to it.
+    let z = world_from_light.z_axis.truncate().normalize_or(DVec3::Z);
+    let x = world_from_light.y_axis.truncate().cross(z);
+    let x = x.try_normalize().unwrap_or(z.any_orthonormal_vector());
+    DMat4::from_cols(
+        x.extend(0.0),
+        z.cross(x).extend(0.0),
+        z.extend(0.0),
+        world_from_light.w_axis,
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_light_moves_with_its_model_and_stays_rigid_in_any_place() {
+        let light = DMat4::from_rotation_translation(
+            DQuat::from_rotation_x(-0.8),
+            DVec3::new(1.0, 2.0, 3.0),
+        );
+        for scale in [
+            DVec3::splat(2.0),
+            DVec3::new(-1.0, 1.0, 1.0),
+            DVec3::new(1.0, 3.0, 0.5),
+        ] {
+            let place = DMat4::from_scale_rotation_translation(
+                scale,
+                DQuat::from_rotation_z(0.4),
+                DVec3::new(10.0, 0.0, -5.0),
+            );
+            let moved = moved_light(&light, &place);
+            let stands = place.transform_point3(DVec3::new(1.0, 2.0, 3.0));
+            assert!((moved.w_axis.truncate() - stands).length() < 1e-12);
+            let shines = place.transform_vector3(light.transform_vector3(-DVec3::Z));
+            let along = moved.transform_vector3(-DVec3::Z);
+            assert!((along - shines.normalize()).length() < 1e-12, "{scale}");
+            assert!((moved.determinant() - 1.0).abs() < 1e-12, "{scale}");
+        }
+    }
 
     #[test]
     fn a_camera_moved_with_its_model_takes_the_same_picture_of_it() {
