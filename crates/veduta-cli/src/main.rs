@@ -2,6 +2,7 @@
 //!
 //! A file for each verb, in `verb/`. Data goes to stdout, talk to stderr; how it ends is in `exit`.
 
+mod excerpt;
 mod exit;
 mod talk;
 mod values;
@@ -58,6 +59,7 @@ struct Common {
 enum Verb {
     Render(Box<verb::render::Render>),
     Info(verb::info::Info),
+    Schema(verb::schema::Schema),
 }
 
 fn main() -> ExitCode {
@@ -97,6 +99,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
     match &arguments.verb {
         Verb::Render(render) => render.run(common.json, &mut talk),
         Verb::Info(info) => info.run(common.json, &mut talk),
+        Verb::Schema(schema) => schema.run(),
     }
 }
 

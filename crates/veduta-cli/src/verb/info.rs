@@ -11,7 +11,7 @@ use veduta::scene::{AlphaMode, Bounds, Material, Scene};
 /// Tell what is inside a model
 #[derive(Debug, Args)]
 pub struct Info {
-    /// The model: .glb, .gltf or .obj
+    /// The model: .glb, .gltf, .obj, or a scene file: .toml
     file: PathBuf,
     /// The axis of the file that points upwards; the format's habit by default
     #[arg(long, value_name = "AXIS")]
@@ -23,7 +23,7 @@ pub struct Info {
 
 impl Info {
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let scene = load(&self.file, self.up_axis, self.strict, talk)?;
+        let scene = load(&self.file, self.up_axis, self.strict, talk)?.scene;
         if json {
             let mut told = as_json(&scene);
             told["file"] = self.file.to_string_lossy().into();

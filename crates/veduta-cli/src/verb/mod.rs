@@ -2,13 +2,13 @@
 
 pub mod info;
 pub mod render;
+pub mod schema;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use clap::ValueEnum;
 use std::path::Path;
-use veduta::scene::Scene;
-use veduta_io::{ReadOptions, UpAxis, read_scene};
+use veduta_io::{Loaded, ReadOptions, UpAxis, closest_name, read_scene};
 
 /// `--up-axis`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -34,7 +34,7 @@ fn load(
     up_axis: Option<UpAxisArgument>,
     strict: bool,
     talk: &mut Talk,
-) -> Result<Scene, Failure> {
+) -> Result<Loaded, Failure> {
     talk.begin("reading");
     let up_axis = up_axis.map(UpAxis::from);
     let loaded = read_scene(path, &ReadOptions { up_axis })?;
@@ -46,5 +46,20 @@ fn load(
         }
         talk.warn(warning.to_string());
     }
-    Ok(loaded.scene)
+    Ok(loaded)
+}
+
+/// What to say of a name that is not among `known`, which are called `what`.
+fn unknown_name<'a>(
+    found: &str,
+    what: &str,
+    known: impl IntoIterator<Item = &'a str> + Clone,
+) -> String {
+    if let Some(meant) = closest_name(found, known.clone()) {
+        return format!("did you mean {meant:?}?");
+    }
+    match known.into_iter().collect::<Vec<_>>().as_slice() {
+        [] => format!("it has no {what}"),
+        names => format!("it has: {}", names.join(", ")),
+    }
 }

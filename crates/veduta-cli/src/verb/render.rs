@@ -1,4 +1,4 @@
-use super::{UpAxisArgument, load};
+use super::{UpAxisArgument, load, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Background, FieldOfView, Size};
@@ -8,24 +8,27 @@ use veduta::accumulate::Picture;
 use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Sampling, Shortcoming};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
-use veduta_geometry::DVec3;
+use veduta_geometry::{DVec2, DVec3};
 use veduta_io::tone::{self, Exposure, Tone};
-use veduta_io::{PictureFormat, PictureOptions, PngDepth, write_picture};
+use veduta_io::{Loaded, PictureFormat, PictureOptions, PngDepth, write_picture};
 
 /// Make a picture of a model
 ///
 /// Without a camera the whole model is shown, three quarters from the front right and a little from
-/// above. World axes: Z is up; a model's front is -Y.
+/// above; of a scene file, its first camera is used. World axes: Z is up; a model's front is -Y.
 #[derive(Debug, Args)]
 pub struct Render {
-    /// The model: .glb, .gltf or .obj
+    /// The model: .glb, .gltf, .obj, or a scene file: .toml
     model: PathBuf,
     /// The picture: .png, .exr or .npy
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Size in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x960")]
-    size: Size,
+    /// Size in pixels; that of the scene file's camera by default, else 1280x960
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
+    /// Show one layer of a scene file only; may be given several times
+    #[arg(long, value_name = "NAME")]
+    layer: Vec<String>,
     /// How areas in pixels are found: exact, or multiscan:N for N sub-scanlines a pixel
     #[arg(long, value_name = "HOW", default_value = "exact", value_parser = values::sampling)]
     sampling: Sampling,
@@ -44,13 +47,8 @@ pub struct Render {
 #[command(next_help_heading = "View")]
 struct View {
     /// A camera of the model by its name; auto shows the whole model
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "auto",
-        conflicts_with = "eye"
-    )]
-    camera: String,
+    #[arg(long, value_name = "NAME", conflicts_with = "eye")]
+    camera: Option<String>,
     /// Where the eye stands, in metres
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     eye: Option<DVec3>,
@@ -66,6 +64,10 @@ struct View {
     /// Parallel projection, with this height of the frame in metres
     #[arg(long, value_name = "HEIGHT", value_parser = values::length)]
     parallel: Option<f64>,
+    /// Move the frame over the picture's plane, in its widths to the right and heights upwards: 0,0.25
+    /// shows a quarter more above, and uprights stay upright
+    #[arg(long, value_name = "X,Y", value_parser = values::shift, allow_hyphen_values = true)]
+    shift: Option<DVec2>,
     /// Distance in metres before which nothing is shown
     #[arg(long, value_name = "D", value_parser = values::length)]
     near: Option<f64>,
@@ -117,12 +119,17 @@ impl Render {
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         let format = PictureFormat::of(&self.output)?;
         refuse_output_nowhere(&self.output)?;
-        let scene = load(&self.model, self.view.up_axis, self.strict, talk)?;
-        let camera = self.view.camera(&self.model, &scene, self.size)?;
+        let loaded = load(&self.model, self.view.up_axis, self.strict, talk)?;
+        let name = self.view.camera_name(&loaded);
+        let size = self.size(&loaded, name)?;
+        // Of the whole scene, so that pictures of its layers fit one on the other.
+        let camera = self.view.camera(&self.model, &loaded.scene, name, size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
 
         let settings = RenderSettings {
-            width: self.size.width,
-            height: self.size.height,
+            width: size.width,
+            height: size.height,
             sampling: self.sampling,
             unlit: self.look.unlit,
         };
@@ -152,13 +159,51 @@ impl Render {
         if json {
             let told = serde_json::json!({
                 "output": self.output.to_string_lossy(),
-                "size": [self.size.width, self.size.height],
+                "size": [size.width, size.height],
                 "faces": scene.face_count(),
                 "exposure": ev,
                 "warnings": talk.warnings(),
             });
             print(&format!("{told}\n"))?;
         }
+        Ok(())
+    }
+
+    /// The size asked for, or that of the camera called `name`.
+    fn size(&self, loaded: &Loaded, name: Option<&str>) -> Result<Size, Failure> {
+        if let Some(size) = self.size {
+            return Ok(size);
+        }
+        let mut sizes = loaded.picture_sizes.iter();
+        match sizes.find(|(of, _)| Some(of.as_str()) == name) {
+            Some(&(_, [width, height])) => {
+                Size::new(width.into(), height.into()).map_err(|problem| {
+                    let name = name.unwrap_or_default();
+                    let message = format!("{}: camera {name:?}: {problem}", self.model.display());
+                    Failure::new(Code::BadInput, message)
+                })
+            }
+            None => Ok(DEFAULT_SIZE),
+        }
+    }
+
+    /// Leaves out all layers but those asked for.
+    fn keep_layers(&self, scene: &mut Scene) -> Result<(), Failure> {
+        if self.layer.is_empty() {
+            return Ok(());
+        }
+        let names = scene.layers.iter().map(|layer| layer.name.as_str());
+        for name in &self.layer {
+            if names.clone().all(|known| known != name) {
+                let message = format!(
+                    "{}: no layer {name:?}; {}",
+                    self.model.display(),
+                    unknown_name(name, "layers", names)
+                );
+                return Err(Failure::new(Code::Missing, message));
+            }
+        }
+        scene.keep_layers(|layer| self.layer.contains(&layer.name));
         Ok(())
     }
 
@@ -211,12 +256,34 @@ fn refuse_output_nowhere(output: &Path) -> Result<(), Failure> {
     })
 }
 
+/// Size of a picture where neither the user nor a camera tells one.
+const DEFAULT_SIZE: Size = Size {
+    width: 1280,
+    height: 960,
+};
+
 /// Depth of the near plane where none is given, as a share of the scene's size.
 const NEAR_SHARE: f64 = 1e-5;
 
 impl View {
-    /// The camera that the arguments ask for.
-    fn camera(&self, model: &Path, scene: &Scene, size: Size) -> Result<Camera, Failure> {
+    /// The name of the camera that is to be used, if it has one: the one asked for, else that which
+    /// the scene file means.
+    fn camera_name<'a>(&'a self, loaded: &'a Loaded) -> Option<&'a str> {
+        match (&self.camera, self.eye) {
+            (Some(name), _) => Some(name.as_str()).filter(|name| *name != "auto"),
+            (None, Some(_)) => None,
+            (None, None) => loaded.default_camera.as_deref(),
+        }
+    }
+
+    /// The camera that the arguments ask for: the one called `name`, or one that they describe.
+    fn camera(
+        &self,
+        model: &Path,
+        scene: &Scene,
+        name: Option<&str>,
+        size: Size,
+    ) -> Result<Camera, Failure> {
         let aspect = f64::from(size.width) / f64::from(size.height);
         let Some(bounds) = Bounds::of_scene(scene) else {
             let message = format!(
@@ -227,9 +294,14 @@ impl View {
         };
         let mut camera = match self.eye {
             Some(eye) => self.explicit(eye, &bounds, aspect)?,
-            None if self.camera == "auto" => self.framing(scene, &bounds, aspect)?,
-            None => self.named(model, scene, aspect)?,
+            None => match name {
+                None => self.framing(scene, &bounds, aspect)?,
+                Some(name) => self.named(model, scene, name, aspect)?,
+            },
         };
+        if let Some(shift) = self.shift {
+            camera.shift = shift;
+        }
         if let Some(near) = self.near {
             camera.near = near;
         }
@@ -294,28 +366,24 @@ impl View {
         })
     }
 
-    fn named(&self, model: &Path, scene: &Scene, aspect: f64) -> Result<Camera, Failure> {
-        let found = scene.cameras.iter().find(|(name, _)| *name == self.camera);
-        let Some(&(_, mut camera)) = found else {
-            let names: Vec<_> = scene
-                .cameras
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
-            let known = match names.as_slice() {
-                [] => "it has no cameras".to_owned(),
-                names => format!("it has: {}", names.join(", ")),
-            };
-            let message = format!("{}: no camera {:?}; {known}", model.display(), self.camera);
+    fn named(
+        &self,
+        model: &Path,
+        scene: &Scene,
+        name: &str,
+        aspect: f64,
+    ) -> Result<Camera, Failure> {
+        let Some((_, camera)) = scene.cameras.iter().find(|(known, _)| known == name) else {
+            let names = scene.cameras.iter().map(|(name, _)| name.as_str());
+            let message = format!(
+                "{}: no camera {name:?}; {}",
+                model.display(),
+                unknown_name(name, "cameras", names)
+            );
             return Err(Failure::new(Code::Missing, message));
         };
         // The picture's shape is the user's: the height of the view is kept.
-        match &mut camera.projection {
-            Projection::Perspective { aspect: of, .. }
-            | Projection::Parallel { aspect: of, .. } => {
-                *of = aspect;
-            }
-        }
+        let mut camera = camera.with_aspect(aspect);
         if self.fov.is_some() || self.parallel.is_some() {
             let was_parallel = matches!(camera.projection, Projection::Parallel { .. });
             camera.projection = self.projection(FRAMING_FOV, aspect);
