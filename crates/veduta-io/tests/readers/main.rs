@@ -4,4 +4,6 @@ mod damaged;
 mod gltf;
 mod obj;
 mod real_models;
+mod scene_file;
+mod scene_file_damaged;
 mod support;

@@ -76,7 +76,21 @@ pub fn described(value: &DeValue<'_>) -> String {
         DeValue::Float(number) => shortened(&number.to_string()),
         DeValue::Boolean(flag) => flag.to_string(),
         DeValue::Datetime(date) => format!("the date {date}"),
-        DeValue::Array(rows) => format!("an array of {}", rows.len()),
+        DeValue::Array(items) => {
+            const MOST: usize = 8;
+            let mut items: Vec<_> = items
+                .iter()
+                .take(MOST + 1)
+                .map(|item| match item.get_ref() {
+                    DeValue::Array(_) => "[…]".into(),
+                    item => described(item),
+                })
+                .collect();
+            if items.len() > MOST {
+                items[MOST] = "…".into();
+            }
+            format!("[{}]", shortened(&items.join(", ")))
+        }
         DeValue::Table(_) => "a table".into(),
     }
 }
@@ -205,17 +219,18 @@ impl<'n, 't> Fields<'n, 't> {
     /// Checks the keys of a table.
     pub fn of(key: &str, node: &'n Node<'t>, layout: &Layout, faults: &mut Faults) -> Option<Self> {
         let table = as_table(key, node, faults)?;
+        // A key that is misspelt is not missing as well.
+        let mut meant = Vec::new();
         for (found, _) in table.iter() {
-            if layout
-                .keys
-                .iter()
-                .all(|known| known.name != found.get_ref())
-            {
-                faults.add(found.span(), layout.unknown(found.get_ref()));
+            let found_name = found.get_ref().as_ref();
+            if layout.keys.iter().all(|known| known.name != found_name) {
+                meant.extend(layout.closest(found_name));
+                faults.add(found.span(), layout.unknown(found_name));
             }
         }
+        let is_missing = |key: &str| !table.contains_key(key) && !meant.contains(&key);
         for key in layout.keys.iter().filter(|key| key.required) {
-            if !table.contains_key(key.name) {
+            if is_missing(key.name) {
                 let problem = Problem::LacksKey {
                     table: layout.called,
                     key: key.name,
@@ -235,7 +250,7 @@ impl<'n, 't> Fields<'n, 't> {
             }
         }
         for &(key, other) in layout.needs {
-            if let (Some(at), None) = (place(key), place(other)) {
+            if let (Some(at), true) = (place(key), is_missing(other)) {
                 faults.add(at, Problem::NeedsKey { key, other });
             }
         }
@@ -256,15 +271,22 @@ impl Layout {
         if let Some(key) = self.not_yet.iter().find(|key| **key == found) {
             return Problem::NotYet { key };
         }
-        let known = || self.keys.iter().map(|key| key.name);
+        let help = match self.closest(found) {
+            Some(meant) => format!("did you mean {meant:?}?"),
+            None => {
+                let known: Vec<_> = self.keys.iter().map(|key| key.name).collect();
+                format!("it may have {}", known.join(", "))
+            }
+        };
         Problem::UnknownKey {
             found: shortened(found).into(),
             table: self.called,
-            help: match closest(found, known()) {
-                Some(meant) => format!("did you mean {meant:?}?"),
-                None => format!("it may have {}", known().collect::<Vec<_>>().join(", ")),
-            },
+            help,
         }
+    }
+
+    fn closest(&self, found: &str) -> Option<&'static str> {
+        closest(found, self.keys.iter().map(|key| key.name))
     }
 
     /// The JSON Schema of the table.

@@ -51,7 +51,8 @@ pub fn read(
         let message = "is empty; expected a header such as x,y,z,heading, and rows below it";
         return Err(whole(Problem::Senseless(message.into())));
     };
-    let columns = Columns::of(fields(header, &mut faults), &mut faults);
+    let header = fields(header, &mut faults).unwrap_or_default();
+    let columns = Columns::of(header, &mut faults);
     for (span, name) in &columns.unknown {
         let help = closest(name, COLUMNS.iter().copied());
         let help = help.map_or_else(String::new, |known| format!("; did you mean {known:?}?"));
@@ -66,12 +67,14 @@ pub fn read(
     let mut faults = Faults::default();
     let mut instances = Vec::new();
     let mut names = HashMap::new();
-    for line in lines {
+    for (row, line) in lines.enumerate() {
         let charged = inclusion.charge(1, size_of::<Instance>());
         charged.map_err(|problem| source.error(line.0.clone(), problem))?;
         let span = line.0.clone();
         let fields = fields(line, &mut faults);
-        if let Some(instance) = columns.instance(instances.len() + 1, &span, &fields, &mut faults) {
+        let instance =
+            fields.and_then(|fields| columns.instance(row + 1, &span, &fields, &mut faults));
+        if let Some(instance) = instance {
             let name = unique(instance.name, &mut names);
             instances.push(Instance { name, ..instance });
         }
@@ -227,7 +230,9 @@ fn lines(text: &str) -> impl Iterator<Item = (Span, &str)> {
 
 /// The fields of a line: between commas, without blanks around them. A field in double quotes may
 /// hold commas, and a quote as two (RFC 4180).
-fn fields<'a>((span, line): (Span, &'a str), faults: &mut Faults) -> Vec<Field<'a>> {
+///
+/// `None`, after `faults` was told, where quotes are wrong.
+fn fields<'a>((span, line): (Span, &'a str), faults: &mut Faults) -> Option<Vec<Field<'a>>> {
     let mut fields = Vec::new();
     let mut at = 0;
     loop {
@@ -239,7 +244,7 @@ fn fields<'a>((span, line): (Span, &'a str), faults: &mut Faults) -> Vec<Field<'
             let Some(length) = quoted_length(&line[inside..]) else {
                 let message = "a double quote that opens a field is not closed on its line";
                 faults.senseless(span.start + inside - 1..span.end, message);
-                return fields;
+                return None;
             };
             let end = inside + length;
             let text = &line[inside..end];
@@ -257,6 +262,7 @@ fn fields<'a>((span, line): (Span, &'a str), faults: &mut Faults) -> Vec<Field<'
                     span.start + end + 1..span.start + end + 1 + to_comma,
                     message,
                 );
+                return None;
             }
             end + 1 + to_comma - at
         } else {
@@ -268,7 +274,7 @@ fn fields<'a>((span, line): (Span, &'a str), faults: &mut Faults) -> Vec<Field<'
         };
         at += length;
         if at >= line.len() {
-            return fields;
+            return Some(fields);
         }
         // Past the comma.
         at += 1;
@@ -296,6 +302,7 @@ mod tests {
     fn texts(line: &str) -> Vec<String> {
         let mut faults = Faults::default();
         fields((0..line.len(), line), &mut faults)
+            .expect("quotes are closed")
             .into_iter()
             .map(|(_, text)| text.into_owned())
             .collect()
@@ -313,7 +320,7 @@ mod tests {
     fn the_place_of_a_field_is_that_of_its_text() {
         let line = "ab,  cd ,\"e\"";
         let mut faults = Faults::default();
-        for (span, text) in fields((0..line.len(), line), &mut faults) {
+        for (span, text) in fields((0..line.len(), line), &mut faults).expect("no quotes") {
             assert_eq!(line[span], *text);
         }
     }

@@ -45,13 +45,13 @@ fn array_schema(length: usize, item: Value) -> Value {
     json!({ "type": "array", "minItems": length, "maxItems": length, "items": item })
 }
 
-/// A number with one of `units`, in the unit whose factor is 1.
+/// A number with one of `units`, in the unit whose factor is 1. It may be too large, infinite.
 fn quantity(value: &DeValue<'_>, units: &[(&str, f64)]) -> Option<f64> {
     let text = value.as_str()?;
     units.iter().find_map(|(unit, factor)| {
         let number = text.strip_suffix(unit)?.trim_end_matches(' ');
         let number: f64 = is_number(number).then(|| number.parse().ok())??;
-        Some(number * factor).filter(|number| number.is_finite())
+        Some(number * factor)
     })
 }
 
@@ -115,7 +115,8 @@ impl Leaf for Angle {
     const EXPECTED: &'static str = "an angle, such as \"30deg\" or \"0.5rad\"";
 
     fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
-        Some(Ok(Self(angle(value)?)))
+        let angle = angle(value)?;
+        ranged(Self(angle), angle.is_finite())
     }
 
     fn schema() -> Value {
@@ -583,14 +584,15 @@ mod tests {
             "\"inf m\"",
             "\"nan m\"",
             "[1]",
-            "\"1e999 m\"",
         ] {
             assert!(parsed::<LensLength>(text).is_none(), "{text}");
         }
-        assert!(matches!(
-            parsed::<LensLength>("\"-1 m\""),
-            Some(Err(OutOfRange))
-        ));
+        for text in ["\"-1 m\"", "\"0 m\"", "\"1e999 m\""] {
+            assert!(
+                parsed::<LensLength>(text).is_some_and(|l| l.is_err()),
+                "{text}"
+            );
+        }
     }
 
     #[test]
