@@ -1,6 +1,8 @@
 //! How the command ends: what each exit code means, and the one way to fail.
 
+use crate::excerpt::with_excerpts;
 use std::fmt;
+use std::io::{self, IsTerminal};
 use veduta_io::{ErrorKind, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem};
 
 /// Exit codes. `0` is success, `130` an interrupt.
@@ -64,7 +66,8 @@ impl From<ReadError> for Failure {
             ErrorKind::Unsupported => Code::Unsupported,
             ErrorKind::InputOutput => Code::InputOutput,
         };
-        Self::new(code, error.to_string())
+        let colored = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        Self::new(code, with_excerpts(&error, "\nveduta: error: ", colored))
     }
 }
 

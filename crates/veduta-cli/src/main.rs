@@ -2,6 +2,7 @@
 //!
 //! A file for each verb, in `verb/`. Data goes to stdout, talk to stderr; how it ends is in `exit`.
 
+mod excerpt;
 mod exit;
 mod preview;
 mod talk;
@@ -83,6 +84,7 @@ enum Verb {
     Examples(verb::examples::Examples),
     Completions(verb::completions::Completions),
     Man(verb::man::Man),
+    Schema(verb::schema::Schema),
 }
 
 fn main() -> ExitCode {
@@ -128,6 +130,7 @@ fn run(arguments: Arguments) -> Result<Ending, Failure> {
         Verb::Examples(examples) => examples.run(common, &mut talk).map(fine),
         Verb::Completions(completions) => completions.run(&mut Arguments::command()).map(fine),
         Verb::Man(man) => man.run(Arguments::command(), common.force).map(fine),
+        Verb::Schema(schema) => schema.run().map(fine),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use veduta::pipeline::Sampling;
-use veduta_geometry::DVec3;
+use veduta_geometry::{DVec2, DVec3};
 use veduta_io::PictureFormat;
 use veduta_io::tone::{Exposure, linear_from_srgb};
 
@@ -19,16 +19,9 @@ const MOST_SIDE: u32 = 65_535;
 /// The most pixels of a picture: 4 GiB as linear f32.
 const MOST_PIXELS: u64 = 1 << 28;
 
-impl FromStr for Size {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let sides = text.split_once(['x', 'X']);
-        let parsed =
-            sides.and_then(|(w, h)| Some((w.parse::<u64>().ok()?, h.parse::<u64>().ok()?)));
-        let Some((width, height)) = parsed else {
-            return Err("expected WIDTHxHEIGHT in pixels, such as 1280x960".into());
-        };
+impl Size {
+    /// A size within what a picture may have.
+    pub fn new(width: u64, height: u64) -> Result<Self, String> {
         let most = u64::from(MOST_SIDE);
         if width == 0 || height == 0 || width > most || height > most {
             return Err(format!("each side must be 1 to {MOST_SIDE} pixels"));
@@ -43,6 +36,20 @@ impl FromStr for Size {
             width: width as u32,
             height: height as u32,
         })
+    }
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let sides = text.split_once(['x', 'X']);
+        let parsed =
+            sides.and_then(|(w, h)| Some((w.parse::<u64>().ok()?, h.parse::<u64>().ok()?)));
+        let Some((width, height)) = parsed else {
+            return Err("expected WIDTHxHEIGHT in pixels, such as 1280x960".into());
+        };
+        Self::new(width, height)
     }
 }
 
@@ -81,6 +88,17 @@ pub fn vector(text: &str) -> Result<DVec3, String> {
     match numbers.as_deref() {
         Some(&[x, y, z]) if DVec3::new(x, y, z).is_finite() => Ok(DVec3::new(x, y, z)),
         _ => Err("expected X,Y,Z such as 3,-4.5,2".into()),
+    }
+}
+
+/// `X,Y`: a shift of the frame, in its widths and heights.
+pub fn shift(text: &str) -> Result<DVec2, String> {
+    let parts = text.split_once(',');
+    let parsed =
+        parts.and_then(|(x, y)| Some(DVec2::new(x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    match parsed {
+        Some(shift) if shift.abs().max_element() <= 1000.0 => Ok(shift),
+        _ => Err("expected X,Y from -1000 to 1000, such as 0,0.25".into()),
     }
 }
 
@@ -226,6 +244,14 @@ mod tests {
         assert_eq!(vector("1,-2.5, 3e2"), Ok(DVec3::new(1.0, -2.5, 300.0)));
         for text in ["1,2", "1,2,3,4", "1,2,nan", "a,b,c", ""] {
             assert!(vector(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn shifts_have_two_numbers_within_reason() {
+        assert_eq!(shift("0, -0.25"), Ok(DVec2::new(0.0, -0.25)));
+        for text in ["1", "1,2,3", "nan,0", "0,1e9", "a,b", ""] {
+            assert!(shift(text).is_err(), "{text}");
         }
     }
 

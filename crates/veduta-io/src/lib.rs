@@ -12,7 +12,8 @@
     feature = "obj",
     feature = "stl",
     feature = "ply",
-    feature = "cityjson"
+    feature = "cityjson",
+    feature = "toml"
 ))]
 mod read;
 mod read_picture;
@@ -25,14 +26,17 @@ mod write;
     feature = "obj",
     feature = "stl",
     feature = "ply",
-    feature = "cityjson"
+    feature = "cityjson",
+    feature = "toml"
 ))]
 pub use read::{
-    ErrorKind, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES, UpAxis, Warning,
-    read_scene,
+    Detail, ErrorKind, Excerpt, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES,
+    UpAxis, Warning, read_scene,
 };
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};
+#[cfg(feature = "toml")]
+pub use read::{closest_name, scene_file_schema};
 pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
 pub use scale::scaled;
 pub use write::{

@@ -9,13 +9,15 @@ mod look;
 pub mod man;
 mod output;
 pub mod render;
+pub mod schema;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use std::path::Path;
-use veduta::scene::Scene;
-use veduta_io::{PictureFormat, ReadOptions, UpAxis, read_scene};
+use veduta_io::{
+    LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
+};
 
 /// `--up-axis`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -50,20 +52,31 @@ fn refuse_to_replace(path: &Path, force: bool) -> Result<(), Failure> {
     Err(Failure::new(Code::Usage, message))
 }
 
-/// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.
-fn load(
-    path: &Path,
+/// How a model's file is to be understood.
+#[derive(Debug, Args)]
+pub struct Reading {
+    /// The axis of the file that points upwards; the format's habit by default
+    #[arg(long, value_name = "AXIS")]
     up_axis: Option<UpAxisArgument>,
-    strict: bool,
-    talk: &mut Talk,
-) -> Result<Scene, Failure> {
+    /// The level of detail of a city model, such as 1.3: of each object the most detailed up to that;
+    /// the most detailed of all by default
+    #[arg(long, value_name = "LEVEL")]
+    lod: Option<LevelOfDetail>,
+}
+
+impl Reading {
+    fn options(&self) -> ReadOptions {
+        ReadOptions {
+            up_axis: self.up_axis.map(UpAxis::from),
+            level_of_detail: self.lod,
+        }
+    }
+}
+
+/// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.
+fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result<Loaded, Failure> {
     talk.begin("reading");
-    let up_axis = up_axis.map(UpAxis::from);
-    let options = ReadOptions {
-        up_axis,
-        ..ReadOptions::default()
-    };
-    let loaded = read_scene(path, &options)?;
+    let loaded = read_scene(path, &reading.options())?;
     talk.end();
     for warning in &loaded.warnings {
         if strict {
@@ -72,5 +85,20 @@ fn load(
         }
         talk.warn(warning.to_string());
     }
-    Ok(loaded.scene)
+    Ok(loaded)
+}
+
+/// What to say of a name that is not among `known`, which are called `what`.
+fn unknown_name<'a>(
+    found: &str,
+    what: &str,
+    known: impl IntoIterator<Item = &'a str> + Clone,
+) -> String {
+    if let Some(meant) = closest_name(found, known.clone()) {
+        return format!("did you mean {meant:?}?");
+    }
+    match known.into_iter().collect::<Vec<_>>().as_slice() {
+        [] => format!("it has no {what}"),
+        names => format!("it has: {}", names.join(", ")),
+    }
 }

@@ -99,7 +99,7 @@ enum Place {
 
 impl Output {
     /// The place asked for, if one is.
-    pub fn target(&self, size: Size, json: bool) -> Result<Option<Target>, Failure> {
+    pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);
         };
@@ -134,14 +134,6 @@ impl Output {
         let for_exr = self.compression.is_some() || self.tile.is_some();
         if for_exr && format != PictureFormat::Exr {
             return usage("--compression and --tile are for .exr".into());
-        }
-        if let Some(most) = format.most_side()
-            && size.width.max(size.height) > most
-        {
-            return usage(format!(
-                "{}: a picture of that format has at most {most} pixels a side; write .png",
-                output.display()
-            ));
         }
         let options = self.options();
         let samples = options.samples_in(format);
@@ -191,6 +183,20 @@ impl Target {
             format,
             options,
         })
+    }
+
+    /// Fails if the format has no pictures of that size.
+    pub fn refuse_size(&self, size: Size) -> Result<(), Failure> {
+        match self.format.most_side() {
+            Some(most) if size.width.max(size.height) > most => {
+                let message = format!(
+                    "{}: a picture of that format has at most {most} pixels a side; write .png",
+                    self.name()
+                );
+                Err(Failure::new(Code::Usage, message))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes the picture there.

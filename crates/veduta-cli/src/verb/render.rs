@@ -1,6 +1,6 @@
 use super::look::Look;
 use super::output::Output;
-use super::{UpAxisArgument, load};
+use super::{Reading, load, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
@@ -10,24 +10,27 @@ use std::path::{Path, PathBuf};
 use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
-use veduta_geometry::DVec3;
-use veduta_io::scaled;
+use veduta_geometry::{DVec2, DVec3};
+use veduta_io::{Loaded, scaled};
 
 /// Make a picture of a model
 ///
 /// Without a camera the whole model is shown, three quarters from the front right and a little from
-/// above. World axes: Z is up; a model's front is -Y.
+/// above; of a scene file, its first camera is used. World axes: Z is up; a model's front is -Y.
 ///
 /// Pictures for a display (.png, .jpg, .webp, .tif of 8 or 16 bits) are exposed and toned unless told;
 /// those for further work (.exr, .pfm, .npy, .tif of floats) are linear and left as they are.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Render {
-    /// The model: .glb, .gltf or .obj
+    /// The model: .glb, .gltf, .obj, .stl, .ply, .city.json, or a scene file: .toml
     model: PathBuf,
-    /// Size in pixels
-    #[arg(long, value_name = "WxH", default_value = "1280x960")]
-    size: Size,
+    /// Size in pixels; that of the scene file's camera by default, else 1280x960
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
+    /// Show one layer of a scene file only; may be given several times
+    #[arg(long, value_name = "NAME")]
+    layer: Vec<String>,
     /// How areas in pixels are found: exact, or multiscan:N for N sub-scanlines a pixel
     #[arg(long, value_name = "HOW", default_value = "exact", value_parser = values::sampling)]
     sampling: Sampling,
@@ -62,13 +65,8 @@ Examples:
 #[command(next_help_heading = "View")]
 pub(super) struct View {
     /// A camera of the model by its name; auto shows the whole model
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "auto",
-        conflicts_with = "eye"
-    )]
-    camera: String,
+    #[arg(long, value_name = "NAME", conflicts_with = "eye")]
+    camera: Option<String>,
     /// Where the eye stands, in metres
     #[arg(long, value_name = "X,Y,Z", value_parser = values::vector, allow_hyphen_values = true)]
     eye: Option<DVec3>,
@@ -84,12 +82,15 @@ pub(super) struct View {
     /// Parallel projection, with this height of the frame in metres
     #[arg(long, value_name = "HEIGHT", value_parser = values::length)]
     parallel: Option<f64>,
+    /// Move the frame over the picture's plane, in its widths to the right and heights upwards: 0,0.25
+    /// shows a quarter more above, and uprights stay upright
+    #[arg(long, value_name = "X,Y", value_parser = values::shift, allow_hyphen_values = true)]
+    shift: Option<DVec2>,
     /// Distance in metres before which nothing is shown
     #[arg(long, value_name = "D", value_parser = values::length)]
     near: Option<f64>,
-    /// The axis of the file that points upwards; the format's habit by default
-    #[arg(long, value_name = "AXIS")]
-    pub(super) up_axis: Option<UpAxisArgument>,
+    #[command(flatten)]
+    pub(super) reading: Reading,
 }
 
 impl Render {
@@ -97,9 +98,15 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let target = self.output.target(self.size, json)?;
-        let scene = load(&self.model, self.view.up_axis, self.strict, talk)?;
-        let camera = self.view.camera(&self.model, &scene, self.size)?;
+        let target = self.output.target(json)?;
+        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        // Of the whole scene, so that pictures of its layers fit one on the other.
+        let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
+        if let Some(target) = &target {
+            target.refuse_size(size)?;
+        }
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
         let development = self.look.development(&scene, self.strict, talk)?;
 
         let screen = self.output.preview.and_then(Screen::of);
@@ -109,7 +116,7 @@ impl Render {
             talk.warn(message.to_owned());
             return Ok(());
         }
-        let size = [self.size.width, self.size.height];
+        let size = [size.width, size.height];
         let preview_size = screen.map(|screen| screen.size_of(size[0], size[1]));
         // A preview alone is made in its own size: areas are exact in any.
         let [width, height] = match (&target, preview_size) {
@@ -164,13 +171,33 @@ impl Render {
         if let (true, Some(target)) = (json, &target) {
             let told = serde_json::json!({
                 "output": target.name(),
-                "size": [self.size.width, self.size.height],
+                "size": size,
                 "faces": scene.face_count(),
                 "exposure": ev,
                 "warnings": talk.warnings(),
             });
             print(&format!("{told}\n"))?;
         }
+        Ok(())
+    }
+
+    /// Leaves out all layers but those asked for.
+    fn keep_layers(&self, scene: &mut Scene) -> Result<(), Failure> {
+        if self.layer.is_empty() {
+            return Ok(());
+        }
+        let names = scene.layers.iter().map(|layer| layer.name.as_str());
+        for name in &self.layer {
+            if names.clone().all(|known| known != name) {
+                let message = format!(
+                    "{}: no layer {name:?}; {}",
+                    self.model.display(),
+                    unknown_name(name, "layers", names)
+                );
+                return Err(Failure::new(Code::Missing, message));
+            }
+        }
+        scene.keep_layers(|layer| self.layer.contains(&layer.name));
         Ok(())
     }
 
@@ -203,26 +230,46 @@ impl Render {
     }
 }
 
+/// The size that a scene file tells for the pictures of its camera called `name`; else the usual one.
+fn size_of_camera(model: &Path, loaded: &Loaded, name: Option<&str>) -> Result<Size, Failure> {
+    let mut sizes = loaded.picture_sizes.iter();
+    let found = sizes.find(|(of, _)| Some(of.as_str()) == name);
+    let [width, height] = found.map_or(Render::USUAL_SIZE, |&(_, size)| size);
+    Size::new(width.into(), height.into()).map_err(|problem| {
+        let name = name.unwrap_or_default();
+        let message = format!("{}: camera {name:?}: {problem}", model.display());
+        Failure::new(Code::BadInput, message)
+    })
+}
+
 /// Depth of the near plane where none is given, as a share of the scene's size.
 const NEAR_SHARE: f64 = 1e-5;
 
 impl View {
     /// Whether any of the options is given.
     pub(super) fn is_asked_for(&self) -> bool {
-        self.camera != "auto"
+        self.camera.is_some()
             || self.eye.is_some()
             || self.fov.is_some()
             || self.parallel.is_some()
+            || self.shift.is_some()
             || self.near.is_some()
     }
 
-    /// The camera that the arguments ask for.
+    /// The camera that the arguments ask for, and the size of its picture: the size asked for, that
+    /// of the scene file's camera, or the usual one.
     pub(super) fn camera(
         &self,
         model: &Path,
-        scene: &Scene,
-        size: Size,
-    ) -> Result<Camera, Failure> {
+        loaded: &Loaded,
+        size: Option<Size>,
+    ) -> Result<(Camera, Size), Failure> {
+        let name = self.camera_name(loaded);
+        let size = match size {
+            Some(size) => size,
+            None => size_of_camera(model, loaded, name)?,
+        };
+        let scene = &loaded.scene;
         let aspect = f64::from(size.width) / f64::from(size.height);
         let Some(bounds) = Bounds::of_scene(scene) else {
             let message = format!(
@@ -233,13 +280,28 @@ impl View {
         };
         let mut camera = match self.eye {
             Some(eye) => self.explicit(eye, &bounds, aspect)?,
-            None if self.camera == "auto" => self.framing(scene, &bounds, aspect)?,
-            None => self.named(model, scene, aspect)?,
+            None => match name {
+                None => self.framing(scene, &bounds, aspect)?,
+                Some(name) => self.named(model, scene, name, aspect)?,
+            },
         };
+        if let Some(shift) = self.shift {
+            camera.shift = shift;
+        }
         if let Some(near) = self.near {
             camera.near = near;
         }
-        Ok(camera)
+        Ok((camera, size))
+    }
+
+    /// The name of the camera that is to be used, if it has one: the one asked for, else that which
+    /// the scene file means.
+    fn camera_name<'a>(&'a self, loaded: &'a Loaded) -> Option<&'a str> {
+        match (&self.camera, self.eye) {
+            (Some(name), _) => Some(name.as_str()).filter(|name| *name != "auto"),
+            (None, Some(_)) => None,
+            (None, None) => loaded.default_camera.as_deref(),
+        }
     }
 
     /// The projection asked for; without, a perspective of `fov`.
@@ -300,28 +362,24 @@ impl View {
         })
     }
 
-    fn named(&self, model: &Path, scene: &Scene, aspect: f64) -> Result<Camera, Failure> {
-        let found = scene.cameras.iter().find(|(name, _)| *name == self.camera);
-        let Some(&(_, mut camera)) = found else {
-            let names: Vec<_> = scene
-                .cameras
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
-            let known = match names.as_slice() {
-                [] => "it has no cameras".to_owned(),
-                names => format!("it has: {}", names.join(", ")),
-            };
-            let message = format!("{}: no camera {:?}; {known}", model.display(), self.camera);
+    fn named(
+        &self,
+        model: &Path,
+        scene: &Scene,
+        name: &str,
+        aspect: f64,
+    ) -> Result<Camera, Failure> {
+        let Some((_, camera)) = scene.cameras.iter().find(|(known, _)| known == name) else {
+            let names = scene.cameras.iter().map(|(name, _)| name.as_str());
+            let message = format!(
+                "{}: no camera {name:?}; {}",
+                model.display(),
+                unknown_name(name, "cameras", names)
+            );
             return Err(Failure::new(Code::Missing, message));
         };
         // The picture's shape is the user's: the height of the view is kept.
-        match &mut camera.projection {
-            Projection::Perspective { aspect: of, .. }
-            | Projection::Parallel { aspect: of, .. } => {
-                *of = aspect;
-            }
-        }
+        let mut camera = camera.with_aspect(aspect);
         if self.fov.is_some() || self.parallel.is_some() {
             let was_parallel = matches!(camera.projection, Projection::Parallel { .. });
             camera.projection = self.projection(FRAMING_FOV, aspect);

@@ -1,5 +1,5 @@
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use veduta::scene::MeshError;
 
 /// Why a scene could not be read: in which file, where in it, and what is wrong there.
@@ -15,6 +15,28 @@ pub struct ReadError {
     pub place: Place,
     /// What is wrong there. Part of the message, therefore not also its `source`.
     pub problem: Problem,
+    /// What more is known if it is of a file that people write.
+    pub detail: Option<Box<Detail>>,
+}
+
+/// What more is known of an error in a file that people write.
+#[derive(Debug)]
+pub struct Detail {
+    /// The line it is about.
+    pub excerpt: Excerpt,
+    /// What else was found wrong in the same file, in the order of its text.
+    pub further: Vec<ReadError>,
+}
+
+/// A line of a text file, and the part of it that an error is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Excerpt {
+    /// The line, or what of it is around the place; without control characters.
+    pub line: String,
+    /// Characters of `line` before the part.
+    pub before: usize,
+    /// Characters of the part, at least 1; they may go on past the end of the line.
+    pub length: usize,
 }
 
 impl ReadError {
@@ -26,8 +48,11 @@ impl ReadError {
             | Problem::Version { .. }
             | Problem::PointCloud { .. }
             | Problem::RequiredExtension { .. }
-            | Problem::RemoteUri(_) => ErrorKind::Unsupported,
-            Problem::NotThere { .. } | Problem::NoBinChunk => ErrorKind::Missing,
+            | Problem::RemoteUri(_)
+            | Problem::NotYet { .. } => ErrorKind::Unsupported,
+            Problem::NotThere { .. } | Problem::NoBinChunk | Problem::NoFile { .. } => {
+                ErrorKind::Missing
+            }
             _ => ErrorKind::BadInput,
         }
     }
@@ -53,6 +78,13 @@ pub enum Place {
     Whole,
     /// A line of a text file, counted from 1.
     Line(u64),
+    /// A character of a text file.
+    Text {
+        /// Its line, counted from 1.
+        line: u64,
+        /// Which character of the line it is, counted from 1.
+        column: u64,
+    },
     /// An offset from the start of a binary file.
     Byte(u64),
     /// A path into a JSON document, such as `meshes[3].primitives[0].indices`.
@@ -72,6 +104,7 @@ impl fmt::Display for Place {
         match self {
             Place::Whole => Ok(()),
             Place::Line(line) => write!(f, ":{line}"),
+            Place::Text { line, column } => write!(f, ":{line}:{column}"),
             Place::Byte(offset) => write!(f, ": byte {offset}"),
             Place::Json(path) => write!(f, ": {path}"),
             Place::JsonInLine { line, path } => write!(f, ":{line}: {path}"),
@@ -265,6 +298,81 @@ pub enum Problem {
         /// The most that are read.
         most: usize,
     },
+    /// A scene file is no TOML.
+    #[error("is not valid TOML: {0}")]
+    Toml(String),
+    /// A key that a scene file may not have there. The JSON Schema refuses it, too.
+    #[error("unknown key {found:?} in {table}; {help}")]
+    UnknownKey {
+        /// The key.
+        found: Box<str>,
+        /// What it stands in.
+        table: &'static str,
+        /// The key that may be meant, or those that there are.
+        help: String,
+    },
+    /// A key that must be there is not. The JSON Schema refuses it, too.
+    #[error("{table} has no {key:?}, which it needs")]
+    LacksKey {
+        /// What should have it.
+        table: &'static str,
+        /// The key.
+        key: &'static str,
+    },
+    /// A key that means nothing without another. The JSON Schema refuses it, too.
+    #[error("{key:?} is given without {other:?}, which it needs")]
+    NeedsKey {
+        /// The key that is there.
+        key: &'static str,
+        /// The one that is not.
+        other: &'static str,
+    },
+    /// Two keys that say the same in different ways. The JSON Schema refuses them, too.
+    #[error("{second:?} and {first:?} exclude each other; keep one of them")]
+    Exclude {
+        /// The key that stands first in the file.
+        first: &'static str,
+        /// The other.
+        second: &'static str,
+    },
+    /// A value of the wrong form. The JSON Schema refuses it, too.
+    #[error("{key} is {found}, expected {expected}")]
+    WrongValue {
+        /// Of what it is the value.
+        key: Box<str>,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: &'static str,
+    },
+    /// A value of the right form that is out of range in a way that a JSON Schema cannot say.
+    #[error("{key} is {found}, expected {expected}")]
+    OutOfRange {
+        /// Of what it is the value.
+        key: Box<str>,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        expected: &'static str,
+    },
+    /// A part of scene files that is planned. The JSON Schema refuses it, too.
+    #[error("{key:?} is not supported yet in scene files; leave it out")]
+    NotYet {
+        /// The key.
+        key: &'static str,
+    },
+    /// Something in a scene file or its tables that has the right form but makes no sense: a
+    /// sentence.
+    #[error("{0}")]
+    Senseless(String),
+    /// A file that a scene file names cannot be read.
+    #[error("names {}, which cannot be read: {reason}", path.display())]
+    NoFile {
+        /// The path that was tried.
+        path: PathBuf,
+        /// Why it could not be read, and a file that may be meant.
+        reason: String,
+    },
     /// The mesh that was read is unsound.
     #[error("mesh {name:?}: {fault}; export the model anew")]
     Mesh {
@@ -296,6 +404,18 @@ impl Problem {
 pub(crate) struct Fault {
     pub place: Place,
     pub problem: Problem,
+}
+
+impl Fault {
+    /// Says in which file.
+    pub fn of(self, file: &Path) -> ReadError {
+        ReadError {
+            file: file.to_owned(),
+            place: self.place,
+            problem: self.problem,
+            detail: None,
+        }
+    }
 }
 
 /// Something that was read otherwise than the file asks for.
@@ -341,14 +461,21 @@ impl Warnings {
 
     /// Adds a warning about a file that belongs to this one.
     pub fn add_in(&mut self, file: PathBuf, place: Place, message: impl Into<String>) {
-        if self.rows.len() < MOST_WARNINGS {
-            self.rows.push(Warning {
-                file,
-                place,
-                message: message.into(),
-            });
-        } else {
-            self.left_out += 1;
+        self.append([Warning {
+            file,
+            place,
+            message: message.into(),
+        }]);
+    }
+
+    /// Adds the warnings of files that belong to this one.
+    pub fn append(&mut self, warnings: impl IntoIterator<Item = Warning>) {
+        for warning in warnings {
+            if self.rows.len() < MOST_WARNINGS {
+                self.rows.push(warning);
+            } else {
+                self.left_out += 1;
+            }
         }
     }
 

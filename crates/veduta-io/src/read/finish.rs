@@ -7,7 +7,7 @@ use veduta_geometry::{DMat4, DVec3, DVec4, Vec2, Vec3};
 
 /// Coordinates of the world stay below this, in metres, so that products of three of them are far
 /// from overflow. Larger would let areas and volumes become infinite.
-const REACH: f64 = 1e30;
+pub(crate) const REACH: f64 = 1e30;
 
 /// Mends what may be mended in a mesh and checks the rest.
 ///

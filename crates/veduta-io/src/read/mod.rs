@@ -13,7 +13,12 @@ mod files;
 mod finish;
 #[cfg(feature = "gltf")]
 mod gltf;
-#[cfg(any(feature = "gltf", feature = "cityjson", feature = "stl"))]
+#[cfg(any(
+    feature = "gltf",
+    feature = "cityjson",
+    feature = "stl",
+    feature = "toml"
+))]
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
@@ -28,6 +33,8 @@ mod picture;
 mod ply;
 #[cfg(any(feature = "obj", feature = "ply", feature = "cityjson"))]
 mod polygon;
+#[cfg(feature = "toml")]
+mod scene_file;
 #[cfg(feature = "stl")]
 mod stl;
 #[cfg(any(feature = "obj", feature = "ply", feature = "stl"))]
@@ -37,7 +44,11 @@ mod vertices;
 
 #[cfg(feature = "cityjson")]
 pub use cityjson::{LevelOfDetail, LevelOfDetailError};
-pub use error::{ErrorKind, Place, Problem, ReadError, Warning};
+pub use error::{Detail, ErrorKind, Excerpt, Place, Problem, ReadError, Warning};
+#[cfg(feature = "toml")]
+pub use names::closest as closest_name;
+#[cfg(feature = "toml")]
+pub use scene_file::scene_file_schema;
 
 use budget::Budget;
 use error::{Fault, Warnings};
@@ -73,6 +84,11 @@ pub struct Loaded {
     pub scene: Scene,
     /// What a user should know.
     pub warnings: Vec<Warning>,
+    /// Name of the camera that a scene file means to be used where none is asked for.
+    pub default_camera: Option<String>,
+    /// Widths and heights in pixels that cameras of a scene file mean their pictures to have, by the
+    /// cameras' names.
+    pub picture_sizes: Vec<(String, [u32; 2])>,
 }
 
 /// Suffixes of the files that [`read_scene`] reads.
@@ -95,6 +111,8 @@ pub const SCENE_SUFFIXES: &[&str] = &[
     "json",
     #[cfg(feature = "cityjson")]
     "jsonl",
+    #[cfg(feature = "toml")]
+    "toml",
 ];
 
 /// Reads a scene from a file and the files it names.
@@ -105,15 +123,22 @@ pub const SCENE_SUFFIXES: &[&str] = &[
 /// # Errors
 /// When the file cannot be read, is damaged, or needs what is not supported. Never panics.
 pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
+    #[cfg(feature = "toml")]
+    if scene_file::is_scene_file(path) {
+        return scene_file::read(path, options);
+    }
+    read_model(path, options)
+}
+
+/// Reads a scene from a file that is no scene file.
+fn read_model(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut warnings = Warnings::new(path.to_owned());
-    let scene = read(path, options, &mut warnings).map_err(|fault| ReadError {
-        file: path.to_owned(),
-        place: fault.place,
-        problem: fault.problem,
-    })?;
+    let scene = read(path, options, &mut warnings).map_err(|fault| fault.of(path))?;
     Ok(Loaded {
         scene,
         warnings: warnings.finish(),
+        default_camera: None,
+        picture_sizes: Vec::new(),
     })
 }
 

@@ -22,6 +22,33 @@ pub(crate) fn unique(name: String, seen: &mut HashMap<String, u32>) -> String {
     }
 }
 
+/// The name that is most likely meant by `found`, which is none of `known`: the one that the fewest
+/// slips of the finger make of it, if they are few for its length.
+///
+/// The first of equals. Capitals do not count.
+#[cfg(feature = "toml")]
+pub fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // The cost grows with the product of the lengths.
+    const LONGEST: usize = 200;
+    let length = found.chars().count();
+    if length > LONGEST {
+        return None;
+    }
+    let most = 1 + length / 4;
+    let lower = found.to_lowercase();
+    let mut best: Option<(usize, &str)> = None;
+    for name in known {
+        if name.len() > 4 * LONGEST {
+            continue;
+        }
+        let slips = strsim::osa_distance(&lower, &name.to_lowercase());
+        if slips <= most && best.is_none_or(|(fewest, _)| slips < fewest) {
+            best = Some((slips, name));
+        }
+    }
+    best.map(|(_, name)| name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -32,5 +59,21 @@ mod tests {
         let given = ["a", "a", "a#2", "a", "a#2", "b"];
         let names: Vec<_> = given.map(|name| unique(name.into(), &mut seen)).into();
         assert_eq!(names, ["a", "a#2", "a#2#2", "a#3", "a#2#3", "b"]);
+    }
+
+    #[cfg(feature = "toml")]
+    #[test]
+    fn a_slip_of_the_finger_is_seen_and_another_word_is_not() {
+        let known = ["translate", "rotate", "scale", "matrix"];
+        for (found, meant) in [
+            ("tranlsate", Some("translate")),
+            ("Scale", Some("scale")),
+            ("rotation", Some("rotate")),
+            ("metrix", Some("matrix")),
+            ("position", None),
+            ("", None),
+        ] {
+            assert_eq!(closest(found, known), meant, "{found}");
+        }
     }
 }

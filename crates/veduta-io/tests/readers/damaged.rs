@@ -15,7 +15,7 @@ static MEMORY: PeakAlloc = PeakAlloc;
 const MOST_MEMORY: usize = 1 << 30;
 
 /// A sound scene, or an error that names the file.
-fn check(name: &str, read: Result<Loaded, ReadError>, case: impl std::fmt::Display) -> bool {
+pub fn check(name: &str, read: Result<Loaded, ReadError>, case: impl std::fmt::Display) -> bool {
     match read {
         Ok(loaded) => {
             assert_sound(&loaded.scene, case);
@@ -202,10 +202,10 @@ const RICH_OBJ: &str = "mtllib none.mtl\no one\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 0\
     s off\no two\nf 1 2 3\nf 4 3 2 1 2 3\n";
 
 /// Numbers that repeat in every run (Knuth's multiplier).
-struct Random(u64);
+pub struct Random(pub u64);
 
 impl Random {
-    fn below(&mut self, most: usize) -> usize {
+    pub fn below(&mut self, most: usize) -> usize {
         self.0 = self
             .0
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -415,7 +415,7 @@ fn read_with_wrong_values(name: &str, sound: &Value, bytes_of: impl Fn(&Value) -
 }
 
 /// Changes, removes or doubles one value somewhere in the document.
-fn damage(document: &mut Value, values: &[Value], random: &mut Random) {
+pub fn damage(document: &mut Value, values: &[Value], random: &mut Random) {
     let mut place = document;
     loop {
         let count = match &*place {

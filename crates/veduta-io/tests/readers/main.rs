@@ -9,5 +9,7 @@ mod gltf_poses;
 mod obj;
 mod ply;
 mod real_models;
+mod scene_file;
+mod scene_file_damaged;
 mod stl;
 mod support;

@@ -13,8 +13,12 @@ impl Folder {
         Self(TempDir::new().expect("a folder for the test"))
     }
 
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
     pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
-        let path = self.0.path().join(name);
+        let path = self.path(name);
         // Cutting off an old file makes some file systems write to the disk at once, which tests with
         // thousands of files would wait for.
         let _ = std::fs::remove_file(&path);

@@ -1,3 +1,4 @@
+use crate::scene::Scene;
 use std::ops::Range;
 use veduta_geometry::DVec3;
 
@@ -11,6 +12,8 @@ pub struct World {
     pub crs: Option<String>,
     /// What stands at (0, 0, 0) of the world, in the coordinates of `crs`.
     pub origin: DVec3,
+    /// What heights are counted from, such as `NAP`, where `crs` does not say it.
+    pub vertical_datum: Option<String>,
 }
 
 /// A part of a scene that can be made apart from the others and composited with them.
@@ -23,4 +26,64 @@ pub struct Layer {
     pub priority: i32,
     /// Its objects: rows of [`Scene::objects`](super::Scene::objects).
     pub objects: Range<u32>,
+}
+
+impl Scene {
+    /// Leaves out the objects of all layers but those that `keep` accepts. Objects of no layer stay.
+    ///
+    /// Meshes, materials, cameras and lights stay as they are: what is left looks as it does among
+    /// the others.
+    pub fn keep_layers(&mut self, keep: impl Fn(&Layer) -> bool) {
+        let mut kept = vec![true; self.objects.len()];
+        for layer in self.layers.iter().filter(|layer| !keep(layer)) {
+            kept[layer.objects.start as usize..layer.objects.end as usize].fill(false);
+        }
+        // How many stay before each object.
+        let mut before = vec![0; kept.len() + 1];
+        for (index, &is_kept) in kept.iter().enumerate() {
+            before[index + 1] = before[index] + u32::from(is_kept);
+        }
+        self.layers.retain(&keep);
+        for layer in &mut self.layers {
+            let moved = |end: u32| before[end as usize];
+            layer.objects = moved(layer.objects.start)..moved(layer.objects.end);
+        }
+        let mut kept = kept.into_iter();
+        self.objects.retain(|_| kept.next().unwrap_or(true));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{MeshId, Object};
+    use veduta_geometry::DMat4;
+
+    #[test]
+    fn kept_layers_keep_their_objects() {
+        let mut scene = Scene::default();
+        for name in ["free", "a/0", "a/1", "b/0", "c/0"] {
+            scene.objects.push(Object {
+                name: name.into(),
+                mesh: MeshId(0),
+                world_from_object: DMat4::IDENTITY,
+            });
+        }
+        for (name, objects) in [("a", 1..3), ("b", 3..4), ("c", 4..5)] {
+            scene.layers.push(Layer {
+                name: name.into(),
+                priority: 0,
+                objects,
+            });
+        }
+        scene.keep_layers(|layer| layer.name != "b");
+        let names: Vec<_> = scene.objects.iter().map(|o| o.name.as_str()).collect();
+        assert_eq!(names, ["free", "a/0", "a/1", "c/0"]);
+        for layer in &scene.layers {
+            for object in &names[layer.objects.start as usize..layer.objects.end as usize] {
+                assert!(object.starts_with(&layer.name), "{layer:?}");
+            }
+        }
+        assert_eq!(scene.layers.len(), 2);
+    }
 }

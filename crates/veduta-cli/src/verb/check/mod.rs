@@ -2,7 +2,7 @@
 
 mod topology;
 
-use super::{UpAxisArgument, is_picture};
+use super::{Reading, is_picture};
 use crate::exit::{Ending, Failure};
 use crate::talk::{Talk, counted, plain, print};
 use clap::Args;
@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use topology::Topology;
 use veduta::scene::Scene;
-use veduta_io::{ReadOptions, UpAxis, read_picture, read_scene};
+use veduta_io::{read_picture, read_scene};
 
 /// Read models and pictures, and report every error and warning
 ///
@@ -26,9 +26,8 @@ pub struct Check {
     /// Models (.glb, .gltf, .obj) and pictures
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// The axis of the files that points upwards; the format's habit by default
-    #[arg(long, value_name = "AXIS")]
-    up_axis: Option<UpAxisArgument>,
+    #[command(flatten)]
+    reading: Reading,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -133,8 +132,7 @@ impl Check {
             }
             return report;
         }
-        let up_axis = self.up_axis.map(UpAxis::from);
-        match read_scene(file, &ReadOptions { up_axis }) {
+        match read_scene(file, &self.reading.options()) {
             Ok(loaded) => {
                 report.warnings = loaded.warnings.iter().map(ToString::to_string).collect();
                 report.held = Some(model(&loaded.scene));

@@ -23,7 +23,7 @@ use veduta_io::{LoadedPicture, read_picture};
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Info {
-    /// The model (.glb, .gltf, .obj) or picture
+    /// The model (.glb, .gltf, .obj, .stl, .ply, .city.json), scene file (.toml) or picture
     file: PathBuf,
     /// List all objects, not only the first
     #[arg(long)]
@@ -35,9 +35,10 @@ pub struct Info {
     /// pixel, 12.5,7.0 the exact point
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
     pick: Option<Spot>,
-    /// Size in pixels of the picture that is picked from
-    #[arg(long, value_name = "WxH", default_value = "1280x960")]
-    size: Size,
+    /// Size in pixels of the picture that is picked from; that of the scene file's camera by default,
+    /// else 1280x960
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
     #[command(flatten)]
     view: View,
 }
@@ -76,13 +77,14 @@ impl Info {
 
     /// JSON and text.
     fn model(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
-        let scene = load(&self.file, self.view.up_axis, self.strict, talk)?;
+        let loaded = load(&self.file, &self.view.reading, self.strict, talk)?;
         let Some(spot) = self.pick else {
-            return Ok((model::as_json(&scene), model::as_text(&scene, self.all)));
+            let scene = &loaded.scene;
+            return Ok((model::as_json(scene), model::as_text(scene, self.all)));
         };
-        let camera = self.view.camera(&self.file, &scene, self.size)?;
+        let (camera, size) = self.view.camera(&self.file, &loaded, self.size)?;
         talk.begin("finding visibility");
-        let picked = pick::pick(&scene, &camera, self.size, spot)?;
+        let picked = pick::pick(&loaded.scene, &camera, size, spot)?;
         talk.end();
         Ok((picked.as_json(), picked.as_text()))
     }

@@ -497,6 +497,7 @@ impl City<'_, '_, '_> {
             world: World {
                 crs,
                 origin: self.origin.unwrap_or(DVec3::ZERO),
+                ..World::default()
             },
             ..self.scene
         }

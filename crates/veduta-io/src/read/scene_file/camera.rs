@@ -1,0 +1,112 @@
+//! Cameras of the file -> cameras of the scene.
+
+use super::document::{Camera as CameraTable, Document};
+use super::source::Faults;
+use veduta::geometry::DVec3;
+use veduta::map::{Camera, Projection};
+use veduta::scene::{Bounds, FRAMING_FOV, Scene};
+
+/// Height of the sensor where none is given, in metres: that of small-format film, 36 mm x 24 mm.
+const SENSOR_HEIGHT: f64 = 0.024;
+/// Width over height of a frame without size; who renders replaces it with that of the picture.
+const ASPECT: f64 = 4.0 / 3.0;
+/// Depth of the near plane where none is given, as a share of the scene's size.
+const NEAR_SHARE: f64 = 1e-5;
+
+/// A camera of the file.
+#[derive(Debug)]
+pub struct NamedCamera {
+    pub name: String,
+    pub camera: Camera,
+    /// In pixels.
+    pub size: Option<[u32; 2]>,
+    has_near: bool,
+    /// From the eye to what it looks at, in metres.
+    distance: f64,
+}
+
+/// The cameras of the file, in its order.
+pub fn all(document: &Document, faults: &mut Faults) -> Vec<NamedCamera> {
+    let Some(cameras) = &document.camera else {
+        return Vec::new();
+    };
+    let mut all = Vec::new();
+    for (name, table) in &cameras.value.0 {
+        match camera(table) {
+            Some(camera) => {
+                let offset = table.look_at.value.0 - table.eye.value.0;
+                all.push(NamedCamera {
+                    name: name.value.0.clone(),
+                    camera,
+                    size: table.size.as_ref().map(|size| size.value.0),
+                    has_near: table.near.is_some(),
+                    distance: offset.length(),
+                });
+            }
+            None => {
+                let message = format!(
+                    "camera {:?}: eye, look_at and up define no direction: the eye must not stand \
+                     on what it looks at, nor look along up",
+                    name.value.0
+                );
+                let at = table.up.as_ref().map_or(&table.look_at.span, |up| &up.span);
+                faults.senseless(at.clone(), message);
+            }
+        }
+    }
+    all
+}
+
+fn camera(table: &CameraTable) -> Option<Camera> {
+    let aspect = match &table.size {
+        Some(size) => {
+            let [width, height] = size.value.0.map(f64::from);
+            width / height
+        }
+        None => ASPECT,
+    };
+    let projection = match (&table.parallel, &table.focal_length) {
+        (Some(height), _) => Projection::Parallel {
+            height: height.value.0,
+            aspect,
+        },
+        (None, Some(focal_length)) => {
+            let sensor = table.sensor_height.as_ref();
+            let sensor = sensor.map_or(SENSOR_HEIGHT, |height| height.value.0);
+            Projection::Perspective {
+                tan_half_height: 0.5 * sensor / focal_length.value.0,
+                aspect,
+            }
+        }
+        (None, None) => {
+            let fov = table.fov.as_ref().map_or(FRAMING_FOV, |fov| fov.value.0);
+            Projection::Perspective {
+                tan_half_height: (0.5 * fov).tan(),
+                aspect,
+            }
+        }
+    };
+    let near = table.near.as_ref().map_or(0.0, |near| near.value.0);
+    let (eye, look_at) = (table.eye.value.0, table.look_at.value.0);
+    let looking = |up| Camera::looking(eye, look_at, up, projection, near);
+    let mut camera = match &table.up {
+        Some(up) => looking(up.value.0),
+        // Straight up or down, north is upwards, as on a plan.
+        None => looking(DVec3::Z).or_else(|| looking(DVec3::Y)),
+    }?;
+    if let Some(shift) = &table.shift {
+        camera.shift = shift.value.0;
+    }
+    Some(camera)
+}
+
+/// Gives perspective cameras without a near plane one that suits the size of the scene.
+pub fn set_near_planes(scene: &mut Scene, cameras: &[NamedCamera]) {
+    let size = Bounds::of_scene(scene).map_or(0.0, |bounds| (bounds.max - bounds.min).length());
+    for ((_, camera), table) in scene.cameras.iter_mut().zip(cameras) {
+        let is_perspective = matches!(camera.projection, Projection::Perspective { .. });
+        if is_perspective && !table.has_near {
+            camera.near = (NEAR_SHARE * size.max(table.distance)).max(f64::MIN_POSITIVE);
+        }
+    }
+}

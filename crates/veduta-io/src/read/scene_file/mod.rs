@@ -1,0 +1,175 @@
+//! Scene files: TOML that puts models together to a scene, with cameras and other materials.
+//!
+//! 1. The text becomes tables whose values know their places (the `toml` crate), or all its faults
+//!    of syntax.
+//! 2. The tables become a [`Document`], or all faults of form (`form`, `value`, `document`). The same
+//!    description makes the JSON [`schema`].
+//! 3. What can be checked before anything large is read is checked: cameras, names, globs, and
+//!    whether the files are there.
+//! 4. Models are read and placed, a layer after the other (`layer`, `instances`, `anchor`); one may
+//!    be a scene file itself.
+//! 5. Materials are changed (`material`), and cameras get the near plane that suits the scene.
+//!
+//! Each step tells all it finds, with places ([`Faults`]); the next begins only if that was nothing.
+
+mod anchor;
+mod camera;
+mod document;
+mod form;
+mod inclusion;
+mod instances;
+mod layer;
+mod material;
+mod source;
+mod value;
+
+use super::error::{Place, Problem, ReadError, Warnings};
+use super::names::closest;
+use super::{Loaded, ReadOptions, files, finish};
+use document::Document;
+use form::{Form, Node};
+use inclusion::Inclusion;
+use serde_json::{Value, json};
+use source::{Faults, Source};
+use std::path::{Path, PathBuf};
+use toml::de::{DeTable, DeValue};
+use veduta::scene::{Layer, Scene};
+
+/// Whether a file is a scene file, by its name.
+pub(crate) fn is_scene_file(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|suffix| suffix.eq_ignore_ascii_case("toml"))
+}
+
+/// The JSON Schema (draft 2020-12) of scene files, as editors use it to complete and to check.
+///
+/// It refuses what the reader refuses, except for what a schema cannot say: that files are there and
+/// names are unique, ranges of values with units, and cameras without a direction to look.
+pub fn scene_file_schema() -> Value {
+    let mut schema = Document::schema();
+    schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
+    schema["title"] = json!("Veduta scene file");
+    schema
+}
+
+/// Reads a scene file and the models it names.
+pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
+    let mut inclusion = Inclusion::new();
+    inclusion
+        .enter(path)
+        .map_err(|problem| problem.at(Place::Whole).of(path))?;
+    read_included(path, options, &mut inclusion)
+}
+
+/// Reads a scene file that `inclusion` knows to be read.
+fn read_included(
+    path: &Path,
+    options: &ReadOptions,
+    inclusion: &mut Inclusion,
+) -> Result<Loaded, ReadError> {
+    let whole = |problem: Problem| problem.at(Place::Whole).of(path);
+    let bytes = files::read_whole(path).map_err(|error| whole(Problem::Unreadable(error)))?;
+    inclusion.add_input(path, bytes.len());
+    let source = Source::new(path, &bytes)?;
+    let document = read_document(&source)?;
+
+    let mut warnings = Warnings::new(path.to_owned());
+    if options.up_axis.is_some() {
+        let message = "a scene file has Z up, so that no other axis can be asked for; its layers \
+            have `up`";
+        warnings.add(Place::Whole, message);
+    }
+    let mut faults = Faults::default();
+    let cameras = camera::all(&document, &mut faults);
+    let globs = material::globs(&document, &mut faults);
+    let layers = layer::plan(&document, path, &mut faults);
+    faults.finish(&source)?;
+
+    let mut parts = layer::read(&layers, &source, inclusion, &mut warnings)?;
+    let mut faults = Faults::default();
+    let world = anchor::anchor(&document, &layers, &mut parts, &mut faults);
+    faults.finish(&source)?;
+
+    let mut scene = Scene {
+        world,
+        ..Scene::default()
+    };
+    let mut picture_sizes = Vec::new();
+    for camera in &cameras {
+        scene.cameras.push((camera.name.clone(), camera.camera));
+        picture_sizes.extend(camera.size.map(|size| (camera.name.clone(), size)));
+    }
+    let default_camera = cameras.first().map(|camera| camera.name.clone());
+    for (layer, part) in layers.iter().zip(parts) {
+        let first = scene.objects.len() as u32;
+        let sizes = layer::append(&mut scene, layer, part, &source, inclusion, &mut warnings)?;
+        picture_sizes.extend(sizes);
+        scene.layers.push(Layer {
+            name: layer.name.to_owned(),
+            priority: layer.priority,
+            objects: first..scene.objects.len() as u32,
+        });
+    }
+    material::change(&mut scene, &globs, &source, inclusion, &mut warnings)?;
+    camera::set_near_planes(&mut scene, &cameras);
+    finish::check_reach(&scene).map_err(whole)?;
+    Ok(Loaded {
+        scene,
+        warnings: warnings.finish(),
+        default_camera,
+        picture_sizes,
+    })
+}
+
+/// The text as a document, or all that is wrong in it.
+fn read_document(source: &Source<'_>) -> Result<Document, ReadError> {
+    let mut faults = Faults::default();
+    let (table, errors) = DeTable::parse_recoverable(source.text);
+    for error in errors {
+        let span = error.span().unwrap_or(0..0);
+        faults.add(span, Problem::Toml(error.message().to_owned()));
+    }
+    faults.finish(source)?;
+
+    let mut faults = Faults::default();
+    let root = Node::new(table.span(), DeValue::Table(table.into_inner()));
+    let document = Document::read("a scene file", &root, &mut faults);
+    faults.finish(source)?;
+    Ok(document.expect("a document without faults can be read"))
+}
+
+/// The path of a file that a scene file names, if it is there and may be read.
+fn find_file(scene_file: &Path, named: &str) -> Result<PathBuf, Problem> {
+    if named.contains("://") {
+        return Err(Problem::RemoteUri(named.to_owned()));
+    }
+    let path = scene_file.parent().unwrap_or(Path::new("")).join(named);
+    let mut reason = match std::fs::metadata(&path) {
+        Ok(metadata) if metadata.is_file() => return Ok(path),
+        Ok(_) => "it is not a plain file".to_owned(),
+        Err(error) => error.to_string(),
+    };
+    if let Some(name) = neighbour(&path) {
+        reason += &format!("; did you mean {name:?}?");
+    }
+    Err(Problem::NoFile { path, reason })
+}
+
+/// The name of a file in the same folder that may be meant.
+fn neighbour(path: &Path) -> Option<String> {
+    /// A folder with more is no place to guess in.
+    const MOST: usize = 1000;
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).ok()?.take(MOST);
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    names.sort();
+    let found = path.file_name()?.to_str()?;
+    closest(found, names.iter().map(String::as_str))
+        .filter(|name| *name != found)
+        .map(str::to_owned)
+}
