@@ -260,7 +260,8 @@ fn emit_part(
         let [p, q, r] = [k, k + 1, k + 2].map(|k| polygon.points[corner(k)]);
         (q - p).cross(r - p).length_squared()
     };
-    let largest = (0..n).max_by(|&j, &k| area(j).total_cmp(&area(k)));
+    // Of equals the first, as there.
+    let largest = (0..n).rev().max_by(|&j, &k| area(j).total_cmp(&area(k)));
     let start = largest.unwrap_or(0);
     let first = [start, start + 1, start + 2].map(corner);
     if is_even(polygon, flat, first, part) {

@@ -390,7 +390,7 @@ fn a_star_that_turns_left_everywhere_is_not_convex() {
 
 #[test]
 fn intricate_polygons_end_in_time() {
-    // A comb of many teeth around a spiral of holes: cubic for a careless cutter.
+    // A comb of many teeth, and a sieve.
     let teeth = 3000;
     let mut outline = vec![DVec3::ZERO, DVec3::new(f64::from(teeth), 0.0, 0.0)];
     for k in (0..2 * teeth).rev() {
@@ -404,5 +404,13 @@ fn intricate_polygons_end_in_time() {
     let start = std::time::Instant::now();
     let parts = parts_of(&[outline], &[], 1e-9);
     assert!(parts.len() > teeth as usize);
+    let holes = (0..900).map(|k| {
+        let (i, j) = (f64::from(k % 30), f64::from(k / 30));
+        flat(&[(i, j), (i + 0.5, j + 0.1), (i + 0.4, j + 0.6)])
+    });
+    let sieve: Vec<_> = std::iter::once(square(-1.0, -1.0, 32.0))
+        .chain(holes)
+        .collect();
+    assert!(parts_of(&sieve, &[], 1e-9).len() > 900);
     assert!(start.elapsed().as_secs() < 30);
 }
