@@ -141,7 +141,7 @@ fn posed_glb() -> Glb {
     let joints = glb.accessor(&[0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0], 5121, "VEC4", 3);
     let weights = glb.accessor(&[9, 9, 0, 0, 255, 0, 0, 0, 1, 0, 0, 0], 5121, "VEC4", 3);
     glb.json["accessors"][weights]["normalized"] = json!(true);
-    let identity = |k: usize| if k % 5 == 0 { 1.0f32 } else { 0.0 };
+    let identity = |k: usize| if k.is_multiple_of(5) { 1.0f32 } else { 0.0 };
     let matrices: Vec<u8> = (0..32)
         .flat_map(|k| identity(k % 16).to_le_bytes())
         .collect();

@@ -207,59 +207,73 @@ impl<'a> Elements<'a> {
     }
 
     /// Elements as vectors of `N` components, those that are absent 1, in the order of `rows`, which
-    /// ascend; without `rows`, all.
+    /// ascend; without `rows`, all. Each is turned to what is kept of it by `make`.
     ///
     /// Integers that are normalised become 0 to 1, or -1 to 1 (glTF 2.0, §3.11).
-    pub fn vectors<const N: usize>(&self, rows: Option<&[u32]>) -> Vec<[f32; N]> {
+    pub fn vectors<const N: usize, R: Clone + Send>(
+        &self,
+        rows: Option<&[u32]>,
+        make: impl Fn([f32; N]) -> R + Sync,
+    ) -> Vec<R> {
         let unit = |scale: f32| if self.normalized { scale } else { 1.0 };
         match self.component {
-            Component::F32 => self.components(rows, f32::from_le_bytes),
+            Component::F32 => self.components(rows, f32::from_le_bytes, make),
             Component::U8 => {
                 let scale = unit(255.0);
-                self.components(rows, |[byte]: [u8; 1]| f32::from(byte) / scale)
+                self.components(rows, |[byte]: [u8; 1]| f32::from(byte) / scale, make)
             }
             Component::U16 => {
                 let scale = unit(65_535.0);
-                self.components(rows, |b| f32::from(u16::from_le_bytes(b)) / scale)
+                let number = |b| f32::from(u16::from_le_bytes(b)) / scale;
+                self.components(rows, number, make)
             }
             Component::I8 => {
                 let scale = unit(127.0);
                 let least = if self.normalized { -1.0 } else { f32::MIN };
-                self.components(rows, |b| {
-                    (f32::from(i8::from_le_bytes(b)) / scale).max(least)
-                })
+                let number = |b| (f32::from(i8::from_le_bytes(b)) / scale).max(least);
+                self.components(rows, number, make)
             }
             Component::I16 => {
                 let scale = unit(32_767.0);
                 let least = if self.normalized { -1.0 } else { f32::MIN };
-                self.components(rows, |b| {
-                    (f32::from(i16::from_le_bytes(b)) / scale).max(least)
-                })
+                let number = |b| (f32::from(i16::from_le_bytes(b)) / scale).max(least);
+                self.components(rows, number, make)
             }
             Component::U32 => {
                 let scale = unit(u32::MAX as f32);
-                self.components(rows, |b| u32::from_le_bytes(b) as f32 / scale)
+                self.components(rows, |b| u32::from_le_bytes(b) as f32 / scale, make)
             }
         }
     }
 
     /// Decodes elements of `B` bytes per component by `number`.
-    fn components<const N: usize, const B: usize>(
+    fn components<const N: usize, const B: usize, R: Clone + Send>(
         &self,
         rows: Option<&[u32]>,
         number: impl Fn([u8; B]) -> f32 + Sync,
-    ) -> Vec<[f32; N]> {
-        if self.components == N {
-            self.decode(rows, |element| {
+        make: impl Fn([f32; N]) -> R + Sync,
+    ) -> Vec<R> {
+        if self.components != N {
+            return self.decode(rows, |element| {
                 let parts = element.as_chunks::<B>().0;
-                std::array::from_fn(|i| number(parts[i]))
-            })
-        } else {
-            self.decode(rows, |element| {
-                let parts = element.as_chunks::<B>().0;
-                std::array::from_fn(|i| parts.get(i).map_or(1.0, |part| number(*part)))
-            })
+                let part = |i| parts.get(i).map_or(1.0, |part| number(*part));
+                make(std::array::from_fn(part))
+            });
         }
+        let read = |parts: &[[u8; B]; N]| make(parts.map(&number));
+        // Where nothing lies between elements their length is known here, which makes decoding
+        // several times as fast.
+        if let (Some(bytes), None, None, true) =
+            (&self.bytes, rows, &self.sparse, self.stride == B * N)
+        {
+            let elements = bytes.as_chunks::<B>().0.as_chunks::<N>().0;
+            let elements = elements.par_iter().with_min_len(ELEMENTS_PER_TASK);
+            return elements.map(read).collect();
+        }
+        self.decode(rows, |element| {
+            let parts = element.as_chunks::<B>().0.first_chunk();
+            read(parts.expect("an element has all its components"))
+        })
     }
 
     /// Decodes each element by `read`, which is given its bytes.

@@ -49,9 +49,9 @@ pub fn places(
     let charged = budget.charge(count, row_bytes);
     charged.map_err(|problem| problem.at_json(&at))?;
 
-    let translations = translations.map(|elements| elements.vectors::<3>(None));
-    let rotations = rotations.map(|elements| elements.vectors::<4>(None));
-    let scales = scales.map(|elements| elements.vectors::<3>(None));
+    let translations = translations.map(|elements| elements.vectors(None, |v: [f32; 3]| v));
+    let rotations = rotations.map(|elements| elements.vectors(None, |v: [f32; 4]| v));
+    let scales = scales.map(|elements| elements.vectors(None, |v: [f32; 3]| v));
     (0..count as usize)
         .map(|index| {
             let vector = |table: &Option<Vec<[f32; 3]>>, default| {

@@ -253,9 +253,17 @@ fn place_meshes(
 struct Poses {
     /// For each skin of the document, once it was asked for.
     skins: Vec<Option<Skin>>,
-    /// By mesh, skin and the node's shares of morph targets, if it has its own: the mesh's id, unless
-    /// it has no faces.
-    read: HashMap<(usize, Option<Index>, Option<Vec<u32>>), Option<MeshId>>,
+    /// The mesh's id, unless it has no faces.
+    read: HashMap<PoseKey, Option<MeshId>>,
+}
+
+/// What makes one posed mesh differ from another.
+#[derive(PartialEq, Eq, Hash)]
+struct PoseKey {
+    mesh: usize,
+    skin: Option<Index>,
+    /// Bits of the node's shares of morph targets, if it has its own.
+    weights: Option<Vec<u32>>,
 }
 
 impl Poses {
@@ -275,7 +283,11 @@ impl Poses {
         };
         let (index, mesh) = row(&document.meshes, mesh, "mesh", at)?;
         let bits = |weights: &Vec<f32>| weights.iter().map(|weight| weight.to_bits()).collect();
-        let key = (index, node.skin, node.weights.as_ref().map(bits));
+        let key = PoseKey {
+            mesh: index,
+            skin: node.skin,
+            weights: node.weights.as_ref().map(bits),
+        };
         if let Some(&known) = self.read.get(&key) {
             return Ok(known);
         }

@@ -56,7 +56,9 @@ impl Skin {
                     .at_json(at));
                 }
                 let rows: Vec<u32> = (0..skin.joints.len() as u32).collect();
-                elements.vectors::<16>(Some(&rows))
+                elements.vectors(Some(&rows), |m: [f32; 16]| {
+                    DMat4::from_cols_array(&m.map(f64::from))
+                })
             }
         };
         let mut world_from_bind = Vec::with_capacity(skin.joints.len());
@@ -69,7 +71,7 @@ impl Skin {
                 return Err(Problem::Illegal { found, expected }.at_json(at));
             };
             world_from_bind.push(match bind.get(number) {
-                Some(matrix) => world_from_joint * DMat4::from_cols_array(&matrix.map(f64::from)),
+                Some(joint_from_bind) => world_from_joint * *joint_from_bind,
                 None => world_from_joint,
             });
         }
@@ -91,21 +93,22 @@ impl Vertices<'_, '_> {
                 continue;
             }
             if let Some(added) = self.difference(target, "POSITION", "VEC3", 12)? {
-                let added = added.vectors::<3>(self.rows);
                 let weight = f64::from(weight);
-                mesh.positions
-                    .par_iter_mut()
-                    .with_min_len(VERTICES_PER_TASK)
-                    .zip(&added)
-                    .for_each(|(position, added)| {
-                        *position += DVec3::from_array(added.map(f64::from)) * weight;
-                    });
+                let share = |d: [f32; 3]| DVec3::from_array(d.map(f64::from)) * weight;
+                for (position, share) in mesh
+                    .positions
+                    .iter_mut()
+                    .zip(added.vectors(self.rows, share))
+                {
+                    *position += share;
+                }
             }
             if !mesh.normals.is_empty()
                 && let Some(added) = self.difference(target, "NORMAL", "VEC3", 12)?
             {
-                for (normal, added) in mesh.normals.iter_mut().zip(added.vectors(self.rows)) {
-                    *normal += Vec3::from_array(added) * weight;
+                let shares = added.vectors(self.rows, |d| Vec3::from_array(d) * weight);
+                for (normal, share) in mesh.normals.iter_mut().zip(shares) {
+                    *normal += share;
                 }
             }
             let tables = [
@@ -118,8 +121,9 @@ impl Vertices<'_, '_> {
                 };
                 let name = format!("TEXCOORD_{set}");
                 if let Some(added) = self.difference(target, &name, "VEC2", 8)? {
-                    for (uv, added) in texcoords.iter_mut().zip(added.vectors(self.rows)) {
-                        *uv += Vec2::from_array(added) * weight;
+                    let shares = added.vectors(self.rows, |d| Vec2::from_array(d) * weight);
+                    for (uv, share) in texcoords.iter_mut().zip(shares) {
+                        *uv += share;
                     }
                 }
             }
@@ -155,7 +159,7 @@ impl Vertices<'_, '_> {
             };
             influences.push(Influences {
                 joints,
-                weights: weights.vectors(self.rows),
+                weights: weights.vectors(self.rows, |weights| weights),
             });
         }
         if influences.is_empty() {
@@ -256,14 +260,16 @@ fn turned(matrix: &DMat3, normal: Vec3) -> Vec3 {
 
 /// Adds a share of a morph target's colours; they stay between 0 and 1 (glTF 2.0, §3.7.2.2).
 fn add_colors(mesh: &mut Mesh, added: &Elements<'_>, weight: f32, rows: Option<&[u32]>) {
-    for (color, added) in mesh.colors.iter_mut().zip(added.vectors::<3>(rows)) {
-        for (part, added) in color.iter_mut().zip(added) {
-            *part = (*part + added * weight).clamp(0.0, 1.0);
+    let shares = added.vectors(rows, |d: [f32; 3]| d.map(|part| part * weight));
+    for (color, share) in mesh.colors.iter_mut().zip(shares) {
+        for (part, share) in color.iter_mut().zip(share) {
+            *part = (*part + share).clamp(0.0, 1.0);
         }
     }
     if !mesh.opacities.is_empty() && added.components == 4 {
-        for (opacity, added) in mesh.opacities.iter_mut().zip(added.vectors::<4>(rows)) {
-            *opacity = (*opacity + added[3] * weight).clamp(0.0, 1.0);
+        let shares = added.vectors(rows, |[_, _, _, a]: [f32; 4]| a * weight);
+        for (opacity, share) in mesh.opacities.iter_mut().zip(shares) {
+            *opacity = (*opacity + share).clamp(0.0, 1.0);
         }
     }
 }

@@ -42,15 +42,15 @@ impl<'a> MeshReader<'a> {
         let compressed = compressed.as_ref();
         // A stream holds separate triangles, whatever is made of it.
         let topology = compressed.map_or(topology, |_| Topology::Triangles);
-        let (corners, rows, vertices) = self.corners(primitive, topology, compressed, at)?;
-        let kept = rows.as_ref().map_or(vertices, |rows| rows.len() as u64);
+        let used = self.corners(primitive, topology, compressed, at)?;
+        let rows = used.rows.as_deref();
         let mut vertices = Vertices {
             reader: self,
             primitive,
             compressed,
-            count: vertices,
-            kept,
-            rows: rows.as_deref(),
+            count: used.vertices,
+            kept: rows.map_or(used.vertices, |rows| rows.len() as u64),
+            rows,
             at,
         };
         let mut mesh = Mesh {
@@ -68,27 +68,24 @@ impl<'a> MeshReader<'a> {
         if let Some(skin) = pose.skin {
             vertices.bend(&mut mesh, skin)?;
         }
-        self.charge(corners.len() as u64, 12, at)?;
-        mesh.triangles = topology.triangles(&corners);
+        self.charge(used.corners.len() as u64, 12, at)?;
+        mesh.triangles = topology.triangles(&used.corners);
         Ok(Some(mesh))
     }
 
-    /// The corners of the faces as rows of the kept vertices; which vertices are kept, ascending
-    /// (`None`: all of them); and the number of vertices before.
+    /// The corners of a primitive's faces, and the vertices they use.
     fn corners(
         &mut self,
         primitive: &Primitive,
         topology: Topology,
         compressed: Option<&Decoded>,
         at: &str,
-    ) -> Result<(Vec<u32>, Option<Vec<u32>>, u64), Fault> {
+    ) -> Result<Corners, Fault> {
         if let Some(decoded) = compressed {
             self.charge(3 * decoded.triangles(), 4, at)?;
-            let vertices = decoded.vertices();
-            let mut corners = decoded.corners();
-            check_indices(&corners, vertices, at)?;
-            let rows = keep_used(&mut corners, vertices);
-            return Ok((corners, rows, vertices));
+            let corners = decoded.corners();
+            check_indices(&corners, decoded.vertices(), at)?;
+            return Ok(Corners::using(corners, decoded.vertices()));
         }
         let at_attributes = format!("{at}.attributes");
         let Some(&position) = primitive.attributes.get("POSITION") else {
@@ -96,11 +93,10 @@ impl<'a> MeshReader<'a> {
         };
         let at_position = format!("{at_attributes}.POSITION");
         let vertices = self.elements(position, "VEC3", &at_position)?.count;
-        let (corners, rows) = match primitive.indices {
+        let used = match primitive.indices {
             Some(index) => {
-                let mut corners = self.indices(index, vertices, &format!("{at}.indices"))?;
-                let rows = keep_used(&mut corners, vertices);
-                (corners, rows)
+                let corners = self.indices(index, vertices, &format!("{at}.indices"))?;
+                Corners::using(corners, vertices)
             }
             None => {
                 self.charge(vertices, 4, &at_position)?;
@@ -109,17 +105,21 @@ impl<'a> MeshReader<'a> {
                     let expected = "fewer than 2^32";
                     Problem::Illegal { found, expected }.at_json(&at_position)
                 })?;
-                ((0..most).collect::<Vec<_>>(), None)
+                Corners {
+                    corners: (0..most).collect(),
+                    rows: None,
+                    vertices,
+                }
             }
         };
-        if topology == Topology::Triangles && corners.len() % 3 != 0 {
+        if topology == Topology::Triangles && used.corners.len() % 3 != 0 {
             let message = format!(
                 "{} corners are no whole number of triangles; the last are left out",
-                corners.len()
+                used.corners.len()
             );
             self.warnings.add(Place::Json(at.to_owned()), message);
         }
-        Ok((corners, rows, vertices))
+        Ok(used)
     }
 
     /// Indices of corners, all of them below `vertices`.
@@ -137,12 +137,14 @@ impl<'a> MeshReader<'a> {
     }
 
     /// What a primitive's compressed stream holds, if it has one.
-    fn compressed(&self, primitive: &Primitive, at: &str) -> Result<Option<Decoded>, Fault> {
+    fn compressed(&mut self, primitive: &Primitive, at: &str) -> Result<Option<Decoded>, Fault> {
         let Some(extension) = &primitive.extensions.draco else {
             return Ok(None);
         };
         let at = format!("{at}.extensions.KHR_draco_mesh_compression");
         let (bytes, _) = self.buffers.view(extension.buffer_view, &at)?;
+        // Many primitives may name one stream, which is long and decodes to little.
+        self.charge(bytes.len() as u64, 1, &at)?;
         let decoded = Decoded::new(bytes, self.budget);
         decoded.map_err(|problem| problem.at_json(at))
     }
@@ -159,6 +161,28 @@ impl<'a> MeshReader<'a> {
     fn charge(&mut self, rows: u64, row_bytes: usize, at: &str) -> Result<(), Fault> {
         let charged = self.budget.charge(rows, row_bytes);
         charged.map_err(|problem| problem.at_json(at))
+    }
+}
+
+/// The corners of a primitive's faces, and the vertices they use.
+struct Corners {
+    /// Rows of the kept vertices.
+    corners: Vec<u32>,
+    /// The vertices that are kept, ascending; `None`: all.
+    rows: Option<Vec<u32>>,
+    /// Number of vertices, whether kept or not.
+    vertices: u64,
+}
+
+impl Corners {
+    /// Keeps those of the `vertices` that are corners, all of which are below `vertices`.
+    fn using(mut corners: Vec<u32>, vertices: u64) -> Self {
+        let rows = keep_used(&mut corners, vertices);
+        Self {
+            corners,
+            rows,
+            vertices,
+        }
     }
 }
 
@@ -246,43 +270,39 @@ impl<'a> Vertices<'_, 'a> {
         let Some(elements) = self.attribute("POSITION", "VEC3", 3 * 4 + 3 * 8)? else {
             return Err(Problem::Lacks("POSITION").at_json(format!("{}.attributes", self.at)));
         };
-        let positions = elements.vectors::<3>(self.rows);
-        let lost = positions
-            .par_iter()
-            .with_min_len(VERTICES_PER_TASK)
-            .position_first(|p| !p.iter().all(|c| c.is_finite()));
+        let wide = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+        let positions = elements.vectors(self.rows, wide);
+        let sound = positions
+            .par_chunks(VERTICES_PER_TASK)
+            .all(|chunk| chunk.iter().all(|p| p.is_finite()));
+        let lost = match sound {
+            true => None,
+            false => positions.iter().position(|p| !p.is_finite()),
+        };
         if let Some(lost) = lost {
             let vertex = self.rows.map_or(lost as u32, |rows| rows[lost]);
             return Err(Problem::Illegal {
-                found: format!("{:?} at vertex {vertex}", positions[lost]),
+                found: format!(
+                    "{:?} at vertex {vertex}",
+                    positions[lost].as_vec3().to_array()
+                ),
                 expected: "finite coordinates",
             }
             .at_json(format!("{}.attributes.POSITION", self.at)));
         }
-        Ok(positions
-            .par_iter()
-            .with_min_len(VERTICES_PER_TASK)
-            .map(|p| DVec3::from_array(p.map(f64::from)))
-            .collect())
+        Ok(positions)
     }
 
     fn normals(&mut self) -> Result<Vec<Vec3>, Fault> {
         let elements = self.attribute("NORMAL", "VEC3", 12)?;
-        Ok(elements.map_or(Vec::new(), |elements| {
-            elements
-                .vectors(self.rows)
-                .into_iter()
-                .map(Vec3::from_array)
-                .collect()
-        }))
+        Ok(elements.map_or(Vec::new(), |e| e.vectors(self.rows, Vec3::from_array)))
     }
 
     /// The texture coordinates of a set; where a texture asks for them and there are none, all 0.
     fn texcoords(&mut self, set: u64, is_used: bool) -> Result<Vec<Vec2>, Fault> {
         let elements = self.attribute(&format!("TEXCOORD_{set}"), "VEC2", 8)?;
         if let Some(elements) = elements {
-            let texcoords = elements.vectors(self.rows);
-            return Ok(texcoords.into_iter().map(Vec2::from_array).collect());
+            return Ok(elements.vectors(self.rows, Vec2::from_array));
         }
         if !is_used {
             return Ok(Vec::new());
@@ -300,18 +320,15 @@ impl<'a> Vertices<'_, 'a> {
             return Ok((Vec::new(), Vec::new()));
         };
         if elements.components == 3 {
-            return Ok((elements.vectors(self.rows), Vec::new()));
+            return Ok((elements.vectors(self.rows, |color| color), Vec::new()));
         }
-        self.reader.charge(self.kept, 16 + 4, self.at)?;
-        let colors = elements.vectors::<4>(self.rows);
-        let opacities = match colors.iter().all(|color| color[3] == 1.0) {
-            true => Vec::new(),
-            false => colors.iter().map(|color| color[3]).collect(),
-        };
-        Ok((
-            colors.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
-            opacities,
-        ))
+        self.reader.charge(self.kept, 4, self.at)?;
+        let colors = elements.vectors(self.rows, |[r, g, b, _]: [f32; 4]| [r, g, b]);
+        let mut opacities = elements.vectors(self.rows, |[_, _, _, a]: [f32; 4]| a);
+        if opacities.iter().all(|&opacity| opacity == 1.0) {
+            opacities = Vec::new();
+        }
+        Ok((colors, opacities))
     }
 }
 
