@@ -97,7 +97,7 @@ pub fn shift(text: &str) -> Result<DVec2, String> {
     let parsed =
         parts.and_then(|(x, y)| Some(DVec2::new(x.trim().parse().ok()?, y.trim().parse().ok()?)));
     match parsed {
-        Some(shift) if shift.abs().max_element() <= 1000.0 => Ok(shift),
+        Some(shift) if shift.is_finite() && shift.abs().max_element() <= 1000.0 => Ok(shift),
         _ => Err("expected X,Y from -1000 to 1000, such as 0,0.25".into()),
     }
 }

@@ -34,7 +34,7 @@ pub fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     if length > LONGEST {
         return None;
     }
-    let most = 1 + length / 4;
+    let most = 1 + length / 5;
     let lower = found.to_lowercase();
     let mut best: Option<(usize, &str)> = None;
     for name in known {
@@ -64,11 +64,12 @@ mod tests {
     #[cfg(feature = "toml")]
     #[test]
     fn a_slip_of_the_finger_is_seen_and_another_word_is_not() {
-        let known = ["translate", "rotate", "scale", "matrix"];
+        let known = ["translate", "rotate", "scale", "matrix", "at"];
         for (found, meant) in [
             ("tranlsate", Some("translate")),
             ("Scale", Some("scale")),
-            ("rotation", Some("rotate")),
+            ("rotaet", Some("rotate")),
+            ("path", None),
             ("metrix", Some("matrix")),
             ("position", None),
             ("", None),
