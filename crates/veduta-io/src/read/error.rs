@@ -309,7 +309,7 @@ pub enum Problem {
         /// What it stands in.
         table: &'static str,
         /// The key that may be meant, or those that there are.
-        help: String,
+        help: Box<str>,
     },
     /// A key that must be there is not. The JSON Schema refuses it, too.
     #[error("{table} has no {key:?}, which it needs")]
@@ -341,7 +341,7 @@ pub enum Problem {
         /// Of what it is the value.
         key: Box<str>,
         /// What is there.
-        found: String,
+        found: Box<str>,
         /// What may be there.
         expected: &'static str,
     },
@@ -351,7 +351,7 @@ pub enum Problem {
         /// Of what it is the value.
         key: Box<str>,
         /// What is there.
-        found: String,
+        found: Box<str>,
         /// What may be there.
         expected: &'static str,
     },
@@ -378,8 +378,8 @@ pub enum Problem {
     Mesh {
         /// Its name.
         name: String,
-        /// What is wrong.
-        fault: MeshError,
+        /// What is wrong; in a box, since errors are passed about by value.
+        fault: Box<MeshError>,
     },
 }
 

@@ -22,6 +22,7 @@ pub(crate) fn finish_mesh(
 ) -> Result<(), Fault> {
     mesh.check().map_err(|fault| {
         let name = name.to_owned();
+        let fault = Box::new(fault);
         Problem::Mesh { name, fault }.at(place.clone())
     })?;
     let mut mended = |what: &str, count: usize, made: &str| {

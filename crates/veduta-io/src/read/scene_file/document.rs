@@ -160,7 +160,7 @@ impl Form for TextureChange {
             other => {
                 let problem = Problem::WrongValue {
                     key: key.into(),
-                    found: described(other),
+                    found: described(other).into(),
                     expected: "a picture, such as { image = \"tiles.jpg\" }, or false",
                 };
                 faults.add(node.span(), problem);

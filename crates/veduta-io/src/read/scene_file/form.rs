@@ -50,12 +50,12 @@ impl<T: Leaf> Form for T {
             Some(Ok(value)) => return Some(value),
             Some(Err(OutOfRange)) => Problem::OutOfRange {
                 key: key.into(),
-                found: found(),
+                found: found().into(),
                 expected: T::EXPECTED,
             },
             None => Problem::WrongValue {
                 key: key.into(),
-                found: found(),
+                found: found().into(),
                 expected: T::EXPECTED,
             },
         };
@@ -111,7 +111,7 @@ impl<T: Form> Form for List<T> {
         let Some(rows) = node.get_ref().as_array().filter(|rows| !rows.is_empty()) else {
             let problem = Problem::WrongValue {
                 key: key.into(),
-                found: described(node.get_ref()),
+                found: described(node.get_ref()).into(),
                 expected: "one or more tables, each under the name in double brackets",
             };
             faults.add(node.span(), problem);
@@ -171,7 +171,7 @@ fn as_table<'n, 't>(key: &str, node: &'n Node<'t>, faults: &mut Faults) -> Optio
     if table.is_none() {
         let problem = Problem::WrongValue {
             key: key.into(),
-            found: described(node.get_ref()),
+            found: described(node.get_ref()).into(),
             expected: "a table",
         };
         faults.add(node.span(), problem);
@@ -281,7 +281,7 @@ impl Layout {
         Problem::UnknownKey {
             found: shortened(found).into(),
             table: self.called,
-            help,
+            help: help.into(),
         }
     }
 
