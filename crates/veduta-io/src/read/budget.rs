@@ -34,6 +34,12 @@ impl Budget {
         self.allowed().saturating_sub(self.spent)
     }
 
+    /// What is said where `asked` bytes are not to be had.
+    pub fn refusal(&self, asked: u64) -> Problem {
+        let input = self.input;
+        Problem::TooLarge { asked, input }
+    }
+
     fn allowed(&self) -> u64 {
         FREE.saturating_add(self.input.saturating_mul(PER_INPUT_BYTE))
     }
@@ -46,10 +52,7 @@ impl Budget {
         let asked = rows.saturating_mul(row_bytes as u64);
         let spent = self.spent.saturating_add(asked);
         if spent > self.allowed() {
-            return Err(Problem::TooLarge {
-                asked,
-                input: self.input,
-            });
+            return Err(self.refusal(asked));
         }
         self.spent = spent;
         Ok(())

@@ -1,6 +1,7 @@
 //! Compressed models, written by the encoders that most tools use; see `tests/data/compress.mjs`.
 
-use crate::support::Folder;
+use crate::support::{Folder, Glb};
+use serde_json::json;
 use veduta::scene::{Mesh, Scene};
 use veduta_geometry::{DVec3, Vec3};
 use veduta_io::ErrorKind;
@@ -176,4 +177,15 @@ fn streams_of_another_kind_are_refused_with_their_view() {
             "{message}"
         );
     }
+}
+
+#[test]
+fn few_compressed_bytes_cannot_ask_for_much_memory() {
+    let mut glb = Glb::from_bytes(MESHOPT_KHR);
+    let stream = &mut glb.json["bufferViews"][0]["extensions"]["KHR_meshopt_compression"];
+    stream["count"] = json!(1_000_000_000);
+    let message = refusal(&glb.bytes());
+    let expected = ": bufferViews[0].extensions.KHR_meshopt_compression.count: asks for \
+                    12000000000 bytes more of memory";
+    assert!(message.starts_with(expected), "{message}");
 }

@@ -6,7 +6,7 @@
 use super::Problem;
 use super::accessor::{Component, Decompressed};
 use crate::read::budget::Budget;
-use draco_core::{DataType, DecodeLimits, DecoderBuffer, MeshDecoder, PointIndex};
+use draco_core::{DataType, DecodeLimits, DecoderBuffer, ErrorKind, MeshDecoder, PointIndex};
 
 /// Bytes that a face takes while it is decoded, about: its corners, and three rows of each of the
 /// tables that tell which corners lie opposite one another.
@@ -28,6 +28,10 @@ impl Decoded {
         let mut mesh = draco_core::Mesh::new();
         match MeshDecoder::new().decode(&mut buffer, &mut mesh) {
             Ok(()) => Ok(Some(Self { mesh })),
+            // It does not tell how much it would have taken, only that it is more than is left.
+            Err(error) if error.kind() == ErrorKind::LimitExceeded => {
+                Err(budget.refusal(left.saturating_add(1)))
+            }
             Err(error) => Err(Problem::Compressed {
                 codec: "Draco",
                 reason: crate::read::files::shortened(&error.to_string()),
@@ -96,5 +100,23 @@ impl Decoded {
             count: vertices,
             bytes,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_that_the_budget_cannot_bear_is_too_large_rather_than_damaged() {
+        let glb = include_bytes!("../../../tests/data/draco-sequential.glb");
+        let start = glb.windows(5).position(|bytes| bytes == b"DRACO");
+        let stream = &glb[start.expect("a stream")..];
+        let mut budget = Budget::new();
+        let decoded = Decoded::new(stream, &budget);
+        assert!(decoded.is_ok_and(|decoded| decoded.is_some_and(|d| d.triangles() == 128)));
+        budget.charge(budget.left(), 1).expect("all that is left");
+        let refused = Decoded::new(stream, &budget);
+        assert!(matches!(refused, Err(Problem::TooLarge { .. })));
     }
 }
