@@ -14,10 +14,11 @@ use veduta_io::{Excerpt, Place, ReadError};
 /// if `colored`.
 pub fn with_excerpts(error: &ReadError, between: &str, colored: bool) -> String {
     let mut text = String::new();
-    add(error, colored, &mut text);
-    for further in error.detail.iter().flat_map(|detail| &detail.further) {
-        text += between;
-        add(further, colored, &mut text);
+    for error in error.all() {
+        if !text.is_empty() {
+            text += between;
+        }
+        add(error, colored, &mut text);
     }
     text
 }

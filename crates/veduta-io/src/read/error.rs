@@ -10,7 +10,7 @@ use veduta::scene::MeshError;
 #[error("{}{place}: {problem}", file.display())]
 pub struct ReadError {
     /// The file.
-    pub file: PathBuf,
+    pub file: Box<Path>,
     /// Where in the file.
     pub place: Place,
     /// What is wrong there. Part of the message, therefore not also its `source`.
@@ -40,6 +40,12 @@ pub struct Excerpt {
 }
 
 impl ReadError {
+    /// This error, and then those that were found with it.
+    pub fn all(&self) -> impl Iterator<Item = &ReadError> {
+        let further = self.detail.iter().flat_map(|detail| &detail.further);
+        std::iter::once(self).chain(further)
+    }
+
     /// Who can mend it.
     pub fn kind(&self) -> ErrorKind {
         match self.problem {
@@ -410,7 +416,7 @@ impl Fault {
     /// Says in which file.
     pub fn of(self, file: &Path) -> ReadError {
         ReadError {
-            file: file.to_owned(),
+            file: file.into(),
             place: self.place,
             problem: self.problem,
             detail: None,

@@ -67,7 +67,7 @@ pub enum UpAxis {
 }
 
 /// How to read a scene.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReadOptions {
     /// The axis that points upwards; `None` for what is usual in the format.
     pub up_axis: Option<UpAxis>,

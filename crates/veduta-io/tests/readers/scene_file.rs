@@ -4,7 +4,7 @@ use crate::support::{Folder, Glb, small_png};
 use serde_json::json;
 use veduta::geometry::{DMat4, DVec2, DVec3, Vec2};
 use veduta::map::{Camera, Projection};
-use veduta::scene::{AlphaMode, Scene};
+use veduta::scene::{AlphaMode, Bounds, Scene};
 use veduta_io::{ErrorKind, Loaded, Place, ReadError, ReadOptions, read_scene};
 
 /// A triangle with two materials' worth of names: `o part`, material `red`, texture coordinates.
@@ -523,6 +523,48 @@ fn georeferenced_parts_stand_relative_to_the_scenes_origin() {
     assert!(error.contains("origin = [84950, 447700, 2]"), "{error}");
 }
 
+/// A building of two levels of detail, 100 m east and 1 m above of (84900, 447700, 0) in EPSG:7415.
+pub const CITY: &str = r#"{ "type": "CityJSON", "version": "2.0",
+    "metadata": { "referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/7415" },
+    "transform": { "scale": [0.001, 0.001, 0.001], "translate": [85000, 447700, 1] },
+    "vertices": [[0, 0, 0], [1000, 0, 0], [0, 1000, 0], [0, 0, 5000]],
+    "CityObjects": { "hall": { "type": "Building", "geometry": [
+        { "type": "MultiSurface", "lod": "1.2", "boundaries": [[[0, 1, 2]]] },
+        { "type": "MultiSurface", "lod": "2.2", "boundaries": [[[0, 1, 3]]] } ] } } }"#;
+
+#[test]
+fn a_city_stands_where_it_is_on_earth_in_the_detail_asked_for() {
+    let folder = folder();
+    folder.write("c.city.json", CITY);
+    let city = "[[layer]]\nname = \"city\"\nmodel = \"c.city.json\"\n";
+    let world = "[world]\ncrs = \"EPSG:7415\"\norigin = [84900, 447700, 0]\n";
+    let extent = |keys: &str| {
+        let scene = sound(&folder, &format!("{world}{city}{keys}")).scene;
+        Bounds::of_scene(&scene).expect("has a face")
+    };
+    let low = DVec3::new(100.0, 0.0, 1.0);
+    for (keys, size) in [
+        ("", DVec3::new(1.0, 0.0, 5.0)),
+        ("lod = \"1.2\"", DVec3::new(1.0, 1.0, 0.0)),
+        ("lod = \"2\"", DVec3::new(1.0, 0.0, 5.0)),
+    ] {
+        let found = extent(keys);
+        assert!((found.min - low).length() < 1e-9, "{keys}: {found:?}");
+        assert!(
+            (found.max - low - size).length() < 1e-9,
+            "{keys}: {found:?}"
+        );
+    }
+    // Alone it brings its own origin.
+    let scene = sound(&folder, city).scene;
+    let found = Bounds::of_scene(&scene).expect("has a face");
+    let there = scene.world.origin + found.min;
+    assert!(
+        (there - DVec3::new(85_000.0, 447_700.0, 1.0)).length() < 1e-9,
+        "{there}"
+    );
+}
+
 #[test]
 fn other_coordinate_systems_and_datums_are_refused() {
     let folder = folder();
@@ -562,7 +604,7 @@ const MISTAKES: &[(&str, &str, ErrorKind, &str)] = &[
         "model =",
         "path =",
         ErrorKind::BadInput,
-        ":10:1: unknown key \"path\" in [[layer]]; it may have name, model, up, at, priority, instances",
+        ":10:1: unknown key \"path\" in [[layer]]; it may have name, model, up, lod, at, priority, instances",
     ),
     (
         "[camera.c]",
@@ -698,6 +740,18 @@ const MISTAKES: &[(&str, &str, ErrorKind, &str)] = &[
     ),
     (
         "priority = 1",
+        "lod = \"2.2\"",
+        ErrorKind::BadInput,
+        ":12:7: `lod` is for city models",
+    ),
+    (
+        "priority = 1",
+        "lod = 2.2",
+        ErrorKind::BadInput,
+        ":12:7: lod is 2.2, expected a level of detail as a text",
+    ),
+    (
+        "priority = 1",
         "priority = 1.5",
         ErrorKind::BadInput,
         ":12:12: priority is 1.5, expected a whole number",
@@ -797,12 +851,7 @@ fn every_mistake_is_told_with_its_place_and_its_mend() {
 
 /// Of the error and those that were found with it.
 fn messages(error: &ReadError) -> Vec<String> {
-    let further = error.detail.iter().flat_map(|detail| &detail.further);
-    [error]
-        .into_iter()
-        .chain(further)
-        .map(ToString::to_string)
-        .collect()
+    error.all().map(ToString::to_string).collect()
 }
 
 /// The part of the line that the caret is under.
@@ -820,9 +869,8 @@ fn all_mistakes_of_a_file_are_told_at_once_and_in_order() {
         .replace("crs", "csr")
         .replace("scale = 2", "scale = [1, 2]");
     let error = read(&folder(), &text).expect_err("four mistakes");
-    let detail = error.detail.as_ref().expect("is of a text");
-    let all = [&error].into_iter().chain(&detail.further);
-    let told: Vec<_> = all
+    let told: Vec<_> = error
+        .all()
         .map(|error| match error.place {
             Place::Text { line, column } => (line, column, pointed_at(error)),
             _ => panic!("no place in a text: {error}"),
@@ -901,7 +949,7 @@ fn an_axis_asked_for_on_the_whole_is_not_silently_ignored() {
         panic!("{:?}", loaded.warnings);
     };
     assert!(
-        warning.to_string().contains("its layers have `up`"),
+        warning.to_string().contains("they have `up` and `lod`"),
         "{warning}"
     );
     let text = format!("{LAYER}[[layer]]\nname = \"b\"\nmodel = \"in.toml\"\nup = \"y\"\n");

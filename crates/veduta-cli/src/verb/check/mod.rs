@@ -44,7 +44,7 @@ Examples:
 /// What was found out of a file.
 struct Report {
     file: PathBuf,
-    error: Option<String>,
+    errors: Vec<String>,
     warnings: Vec<String>,
     held: Option<Held>,
 }
@@ -111,7 +111,7 @@ impl Check {
     fn check(&self, file: &Path) -> Report {
         let mut report = Report {
             file: file.to_owned(),
-            error: None,
+            errors: Vec::new(),
             warnings: Vec::new(),
             held: None,
         };
@@ -128,7 +128,7 @@ impl Check {
                         height: loaded.picture.height,
                     });
                 }
-                Err(error) => report.error = Some(error.to_string()),
+                Err(error) => report.errors.push(error.to_string()),
             }
             return report;
         }
@@ -137,7 +137,7 @@ impl Check {
                 report.warnings = loaded.warnings.iter().map(ToString::to_string).collect();
                 report.held = Some(model(&loaded.scene));
             }
-            Err(error) => report.error = Some(error.to_string()),
+            Err(error) => report.errors.extend(error.all().map(ToString::to_string)),
         }
         report
     }
@@ -175,14 +175,14 @@ const MOST_MESHES: usize = 20;
 
 impl Report {
     fn failed(&self, strict: bool) -> bool {
-        self.error.is_some() || strict && !self.warnings.is_empty()
+        !self.errors.is_empty() || strict && !self.warnings.is_empty()
     }
 
     fn as_json(&self, strict: bool) -> Value {
         let mut told = json!({
             "file": self.file.to_string_lossy(),
             "failed": self.failed(strict),
-            "error": self.error,
+            "errors": self.errors,
             "warnings": self.warnings,
         });
         match &self.held {
@@ -216,7 +216,7 @@ impl Report {
     fn write_text(&self, brief: bool, text: &mut String) -> std::fmt::Result {
         let file = plain(&self.file.to_string_lossy());
         // The messages begin with the file's name, and the place in it.
-        if let Some(error) = &self.error {
+        for error in &self.errors {
             writeln!(text, "error: {}", plain(error))?;
         }
         match &self.held {

@@ -4,7 +4,7 @@ use super::form::{Fields, Form, Given, Key, Layout, List, Named, Node, described
 use super::source::Faults;
 use super::value::{
     Angle, CameraName, Color, Direction, Emission, FieldOfView, FilePath, Flag, Length, LensLength,
-    Matrix, Name, Opacity, PictureSize, Priority, Repeat, Scale, Shift, Text, Up, Vector,
+    Lod, Matrix, Name, Opacity, PictureSize, Priority, Repeat, Scale, Shift, Text, Up, Vector,
 };
 use crate::read::error::Problem;
 use serde_json::{Value, json};
@@ -81,6 +81,9 @@ table! {
         required model: FilePath,
         /// The axis of the model's file that points upwards; what is usual in the format by default.
         optional up: Up,
+        /// The level of detail of a city model, such as "2.2": of each object the most detailed up to
+        /// that; the most detailed of all by default.
+        optional lod: Lod,
         /// How the model is placed in the scene.
         optional at: Placement,
         /// Of faces in one plane those of the layer with the higher priority are seen; 0 by default.

@@ -148,7 +148,11 @@ impl<K: Leaf, T: Form> Form for Named<K, T> {
                 &Spanned::new(name.span(), value),
                 faults,
             );
-            let read = T::read(&format!("{key}.{}", name.get_ref()), node, faults);
+            let read = T::read(
+                &format!("{key}.{}", name.get_ref().escape_debug()),
+                node,
+                faults,
+            );
             if let (Some(value), Some(read)) = (called, read) {
                 let span = name.span();
                 rows.push((Given { value, span }, read));

@@ -6,6 +6,8 @@ use super::instances;
 use super::source::{Faults, Source, Span};
 use super::value::Up;
 use super::{find_file, is_scene_file, read_included};
+#[cfg(feature = "cityjson")]
+use crate::read::LevelOfDetail;
 use crate::read::error::{Problem, ReadError, Warnings};
 use crate::read::names::unique;
 use crate::read::{Loaded, ReadOptions, UpAxis, read_model};
@@ -23,7 +25,7 @@ pub struct PlannedLayer<'d> {
     pub priority: i32,
     model: PathBuf,
     pub model_span: Span,
-    up: Option<UpAxis>,
+    options: ReadOptions,
     at: DMat4,
     instances: Option<(PathBuf, Span)>,
 }
@@ -79,6 +81,12 @@ pub fn plan<'d>(
             let message = "the model is a scene file, which has Z up always; leave `up` out";
             faults.senseless(up.span.clone(), message);
         }
+        if let (Some(lod), Some(model)) = (&layer.lod, &model)
+            && !is_city_model(model)
+        {
+            let message = "`lod` is for city models (.city.json, .city.jsonl); leave it out";
+            faults.senseless(lod.span.clone(), message);
+        }
         let at = layer.at.as_ref();
         if let (Some(model), None | Some(Some(_))) = (model, &instances) {
             layers.push(PlannedLayer {
@@ -89,7 +97,14 @@ pub fn plan<'d>(
                     .map_or(0, |priority| priority.value.0),
                 model,
                 model_span,
-                up,
+                options: ReadOptions {
+                    up_axis: up,
+                    #[cfg(feature = "cityjson")]
+                    level_of_detail: layer.lod.as_ref().map(|lod| LevelOfDetail {
+                        level: lod.value.level,
+                        refinement: lod.value.refinement,
+                    }),
+                },
                 at: at.map_or(DMat4::IDENTITY, |at| world_from_model(&at.value)),
                 instances: instances.flatten(),
             });
@@ -97,6 +112,13 @@ pub fn plan<'d>(
     }
     layers.sort_by_key(|layer| Reverse(layer.priority));
     layers
+}
+
+/// Whether a file is one of the formats that have levels of detail, by its name.
+fn is_city_model(path: &Path) -> bool {
+    path.extension().is_some_and(|suffix| {
+        suffix.eq_ignore_ascii_case("json") || suffix.eq_ignore_ascii_case("jsonl")
+    })
 }
 
 /// Scale, then rotation, then translation; or the matrix.
@@ -125,17 +147,13 @@ pub fn read(
     let mut parts = Vec::with_capacity(layers.len());
     for layer in layers {
         let here = |problem: Problem| source.error(layer.model_span.clone(), problem);
-        let options = ReadOptions {
-            up_axis: layer.up,
-            ..ReadOptions::default()
-        };
         let mut loaded = if is_scene_file(&layer.model) {
             inclusion.enter(&layer.model).map_err(here)?;
-            let loaded = read_included(&layer.model, &options, inclusion)?;
+            let loaded = read_included(&layer.model, &layer.options, inclusion)?;
             inclusion.leave();
             loaded
         } else {
-            read_model(&layer.model, &options)?
+            read_model(&layer.model, &layer.options)?
         };
         let charged = inclusion.charge_model(&layer.model, &loaded.scene);
         charged.map_err(here)?;

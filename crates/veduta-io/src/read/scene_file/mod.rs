@@ -74,9 +74,9 @@ fn read_included(
     let document = read_document(&source)?;
 
     let mut warnings = Warnings::new(path.to_owned());
-    if options.up_axis.is_some() {
-        let message = "a scene file has Z up, so that no other axis can be asked for; its layers \
-            have `up`";
+    if *options != ReadOptions::default() {
+        let message = "its models are read as its layers say, so that no axis or level of detail \
+            can be asked for; they have `up` and `lod`";
         warnings.add(Place::Whole, message);
     }
     let mut faults = Faults::default();

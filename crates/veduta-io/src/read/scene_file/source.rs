@@ -49,7 +49,7 @@ impl<'a> Source<'a> {
     /// An error about a part of the text.
     pub fn error(&self, span: Span, problem: Problem) -> ReadError {
         ReadError {
-            file: self.path.to_owned(),
+            file: self.path.into(),
             place: self.place(span.start),
             problem,
             detail: Some(Box::new(Detail {

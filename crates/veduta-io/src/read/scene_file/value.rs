@@ -336,6 +336,31 @@ impl Leaf for Up {
     }
 }
 
+/// A level of detail of a city model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lod {
+    pub level: u8,
+    pub refinement: Option<u8>,
+}
+
+impl Leaf for Lod {
+    const EXPECTED: &'static str = "a level of detail as a text, such as \"2\" or \"2.2\"";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        let digit = |byte: u8| byte.is_ascii_digit().then(|| byte - b'0');
+        let (level, refinement) = match *value.as_str()?.as_bytes() {
+            [level] => (digit(level)?, None),
+            [level, b'.', refinement] => (digit(level)?, Some(digit(refinement)?)),
+            _ => return None,
+        };
+        Some(Ok(Self { level, refinement }))
+    }
+
+    fn schema() -> Value {
+        json!({ "type": "string", "pattern": r"^[0-9](\.[0-9])?$" })
+    }
+}
+
 /// Which of coplanar faces are seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Priority(pub i32);
@@ -512,7 +537,7 @@ pub struct Name(pub String);
 impl Name {
     /// Whether `text` may be a name.
     pub fn is_sound(text: &str) -> bool {
-        !text.is_empty() && text.chars().all(|c| c != '/' && c > '\u{1f}')
+        !text.is_empty() && text.chars().all(|c| c != '/' && !c.is_control())
     }
 }
 
@@ -525,7 +550,7 @@ impl Leaf for Name {
     }
 
     fn schema() -> Value {
-        json!({ "type": "string", "pattern": r"^[^/\u0000-\u001f]+$" })
+        json!({ "type": "string", "pattern": r"^[^/\u0000-\u001f\u007f-\u009f]+$" })
     }
 }
 
