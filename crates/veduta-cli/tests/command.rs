@@ -248,7 +248,7 @@ const FAILURES: &[(&str, i32, &str)] = &[
         "untextured.obj:1: the material library",
     ),
     (
-        "render model.stl -o a.png",
+        "render model.fbx -o a.png",
         5,
         "scenes are read from .glb, .gltf, .obj",
     ),
@@ -290,7 +290,7 @@ fn failures_say_why_with_their_exit_code_and_leave_no_file() {
         "untextured.obj",
         "mtllib gone.mtl\nv 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n",
     );
-    folder.write("model.stl", "solid\n");
+    folder.write("model.fbx", "Kaydara\n");
     fs::create_dir(folder.path("folder.png")).expect("may write in the test's folder");
     let before = folder.files();
     for (arguments, code, message) in FAILURES {
@@ -393,19 +393,20 @@ fn json_tells_what_was_made_and_what_is_inside() {
     let made: serde_json::Value = serde_json::from_slice(&made.stdout).expect("JSON");
     assert_eq!(made["output"], "a.png");
     assert_eq!(made["size"], serde_json::json!([8, 8]));
-    assert_eq!(made["faces"], 2);
+    // A flat quadrilateral is one face.
+    assert_eq!(made["faces"], 1);
 
     let inside = folder
         .veduta("info square.obj --json")
         .output()
         .expect("runs");
     let inside: serde_json::Value = serde_json::from_slice(&inside.stdout).expect("JSON");
-    assert_eq!(inside["faces"], 2);
+    assert_eq!(inside["faces"], 1);
     assert_eq!(inside["objects"][0]["name"], "square");
     assert_eq!(inside["materials"][0]["name"], "red");
     // Upright: what was Y in the file is Z.
     assert_eq!(inside["extent"]["max"], serde_json::json!([1.0, 0.0, 1.0]));
-    let text = predicate::str::contains("faces     2").and(predicate::str::contains("red"));
+    let text = predicate::str::contains("faces     1").and(predicate::str::contains("red"));
     folder
         .veduta("info square.obj")
         .assert()

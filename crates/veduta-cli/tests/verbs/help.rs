@@ -11,6 +11,7 @@ const VERBS: &[&str] = &[
     "examples",
     "completions",
     "man",
+    "schema",
 ];
 
 /// The commands of a help text's examples.
