@@ -235,7 +235,7 @@ impl<'a> PlacedMesh<'a> {
                 continue;
             };
             if next < faces.end
-                && let Some(corner) = self.mesh.corner_beyond_shared_edge(face, next)
+                && let Some(corner) = self.corner_beyond_shared_edge(face, next)
                 && plane.is_near(self.position(corner), plane.tolerance)
             {
                 next += 1;
@@ -250,17 +250,16 @@ impl<'a> PlacedMesh<'a> {
         let mut corners = self.mesh.corners_of(face);
         corners.all(|corner| plane.is_near(self.position(corner), tolerance))
     }
-}
 
-impl Mesh {
     /// The corner of the triangle `other` that lies across the edge that it shares with `face`, if both
     /// are triangles with an edge in common, run through in opposite directions: then, in one plane,
     /// they do not overlap. Vertices need not be shared: flat shading gives each face its own.
     fn corner_beyond_shared_edge(&self, face: u32, other: u32) -> Option<u32> {
         let [p, q, r] = self.only_triangle_of(face)?;
         let [a, b, c] = self.only_triangle_of(other)?;
-        let is_same =
-            |a: u32, b: u32| a == b || self.positions[a as usize] == self.positions[b as usize];
+        let is_same = |a: u32, b: u32| {
+            a == b || self.mesh.positions[a as usize] == self.mesh.positions[b as usize]
+        };
         for (from, to) in [(p, q), (q, r), (r, p)] {
             for (start, end, corner) in [(a, b, c), (b, c, a), (c, a, b)] {
                 if is_same(from, end) && is_same(to, start) {
@@ -272,8 +271,8 @@ impl Mesh {
     }
 
     fn only_triangle_of(&self, face: u32) -> Option<[u32; 3]> {
-        let range = self.triangles_of(face);
-        (range.len() == 1).then(|| self.triangles[range.start])
+        let range = self.mesh.triangles_of(face);
+        (range.len() == 1).then(|| self.mesh.triangles[range.start])
     }
 }
 

@@ -1,4 +1,5 @@
 use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use veduta_geometry::DVec3;
 
@@ -6,7 +7,7 @@ use veduta_geometry::DVec3;
 ///
 /// Georeferenced coordinates are large: metres from an origin far away. They are taken relative to
 /// [`World::origin`] in double precision before anything else is done with them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct World {
     /// Coordinate reference system, such as `EPSG:7415`; `None` for a scene that is nowhere.
     pub crs: Option<String>,
@@ -17,7 +18,7 @@ pub struct World {
 }
 
 /// A part of a scene that can be made apart from the others and composited with them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
     /// Its name, with which the names of its objects and materials begin.
     pub name: String,
