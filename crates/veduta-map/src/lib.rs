@@ -19,7 +19,7 @@ mod stored;
 
 pub use camera::{Camera, Projection};
 pub use faces::Faces;
-pub use fragments::{Fragment, Fragments, Side};
+pub use fragments::{Fragment, Fragments, Seen, Side};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
 pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};

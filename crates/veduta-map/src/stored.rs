@@ -60,11 +60,14 @@ fn faces_named(map: &VisibilityMap) -> Vec<FaceId> {
 }
 
 impl Fragments {
-    /// The same fragments of faces with other numbers, which must ascend as the old ones do.
+    /// The same fragments of faces with other numbers, in their order.
     pub fn renumbered(&self, new_id: impl Fn(FaceId) -> FaceId) -> Self {
+        let mut order: Vec<usize> = (0..self.len()).collect();
+        // Stable: the fragments of a face stay in order.
+        order.sort_by_key(|&index| new_id(self.face(index)));
         let mut renumbered = Self::new();
-        for fragment in self.iter() {
-            match fragment {
+        for index in order {
+            match self.get(index) {
                 Fragment::Whole(face) => renumbered.push_whole(new_id(face)),
                 Fragment::Cut {
                     face,

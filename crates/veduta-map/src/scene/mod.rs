@@ -15,6 +15,7 @@ pub use world::{Layer, World};
 
 use crate::{Camera, MaterialId, ObjectId};
 use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
 use veduta_geometry::DMat4;
 
 /// Index of a mesh in [`Scene::meshes`].
@@ -36,10 +37,10 @@ pub struct Object {
     pub world_from_object: DMat4,
 }
 
+/// Priority of an object's layer, the layer's name, the object's.
+pub type ObjectKey<'a> = (Reverse<i32>, &'a str, &'a str);
+
 /// A scene.
-///
-/// The order of `objects` is the key order of coplanar faces: of two that share a plane, the face
-/// of the earlier object is seen.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// The objects.
@@ -61,6 +62,25 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The objects in the order that decides which of two faces in one plane is seen, that of the
+    /// earlier one: by priority of the layer, descending, then by the names of layer and object. It does
+    /// not depend on the order in which files were read.
+    pub fn key_order(&self) -> Vec<ObjectId> {
+        let mut order: Vec<ObjectId> = (0..self.objects.len()).map(ObjectId::from_index).collect();
+        order.sort_by_cached_key(|&object| self.key_of(object));
+        order
+    }
+
+    /// What [`Scene::key_order`] sorts by.
+    pub fn key_of(&self, object: ObjectId) -> ObjectKey<'_> {
+        let layer = self.layer_of(object);
+        (
+            Reverse(layer.map_or(0, |layer| layer.priority)),
+            layer.map_or("", |layer| layer.name.as_str()),
+            self.object(object).name.as_str(),
+        )
+    }
+
     /// The object's row.
     pub fn object(&self, id: ObjectId) -> &Object {
         &self.objects[id.index()]

@@ -1,3 +1,4 @@
+use crate::ObjectId;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -30,6 +31,16 @@ pub struct Layer {
 }
 
 impl Scene {
+    /// The layer of an object, if it is of one.
+    pub fn layer_of(&self, object: ObjectId) -> Option<&Layer> {
+        // Layers stand in the order of their objects.
+        let next = self
+            .layers
+            .partition_point(|layer| layer.objects.end <= object.0);
+        let layer = self.layers.get(next)?;
+        layer.objects.contains(&object.0).then_some(layer)
+    }
+
     /// Leaves out the objects of all layers but those that `keep` accepts. Objects of no layer stay.
     ///
     /// Meshes, materials, cameras and lights stay as they are: what is left looks as it does among

@@ -10,9 +10,11 @@
 
 use crate::scene::{Mesh, Object, Scene};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
 use veduta_geometry::{DMat4, DVec3};
+use veduta_map::{FaceId, Faces};
 
 /// Deviation from a plane, relative to the largest coordinate of a face, that counts as rounding:
 /// four units in the last place of single precision, in which most models are stored. More would
@@ -83,6 +85,28 @@ impl PlaneGroups {
         let start = self.pairs.partition_point(|pair| pair.0.0 < object);
         let end = self.pairs.partition_point(|pair| pair.0.0 <= object);
         &self.pairs[start..end]
+    }
+
+    /// Gives the faces of each group the plane of the first of them that is in the table.
+    pub fn share_planes(&self, faces: &mut Faces) {
+        if self.pairs.is_empty() {
+            return;
+        }
+        let mut first_seen: HashMap<FaceIndex, FaceId> = HashMap::new();
+        let mut pairs = self.pairs.iter().peekable();
+        let mut object = None;
+        for face in faces.ids() {
+            let index = (faces.object(face).0, faces.source(face));
+            // Within an object faces and pairs ascend alike.
+            if object != Some(index.0) {
+                object = Some(index.0);
+                pairs = self.of_object(index.0).iter().peekable();
+            }
+            while pairs.next_if(|pair| pair.0 < index).is_some() {}
+            if let Some(&(_, group)) = pairs.next_if(|pair| pair.0 == index) {
+                faces.share_plane(face, *first_seen.entry(group).or_insert(face));
+            }
+        }
     }
 }
 

@@ -14,5 +14,5 @@ pub use coplanar::{FaceIndex, PlaneGroups};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
 pub use veduta_map::scene::{
     AlphaMode, Image, ImageId, Layer, Light, LightKind, Material, Mesh, MeshError, MeshId, Object,
-    Scene, TexcoordSet, TextureRef, World, Wrap,
+    ObjectKey, Scene, TexcoordSet, TextureRef, World, Wrap,
 };
