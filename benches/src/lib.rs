@@ -5,6 +5,7 @@
 //! code gets. Multiscan is part of the library.
 
 pub mod cases;
+pub mod composite;
 pub mod exchange;
 pub mod fit;
 pub mod glb;

@@ -10,6 +10,7 @@ use veduta::accumulate::Picture;
 use veduta::map::VisibilityMap;
 use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
+use veduta_bench::composite::stored_times;
 use veduta_bench::fit::Line;
 use veduta_bench::peers;
 use veduta_bench::table::Table;
@@ -27,6 +28,7 @@ Tables:
             the n that costs as much as the exact picture (Tanaka & Takahashi 1991, table 1)
   zbuffer   the exact map, and picture, against a z-buffer with one sample a pixel
   engines   all methods, supersampling included
+  stored    stored maps: compositing two and eight, writing, reading, a window of a sixteenth
 
 Columns: map is the exact map alone, exact the map and its pixels.
 
@@ -48,7 +50,33 @@ struct Measurement {
     row: fn(&Case) -> Vec<String>,
 }
 
-const MEASUREMENTS: [Measurement; 3] = [
+const MEASUREMENTS: [Measurement; 4] = [
+    Measurement {
+        name: "stored",
+        scenes: &[
+            "pierce",
+            "balls7",
+            "bridge",
+            "buildings",
+            "field100k",
+            "field1m@1920x1080",
+        ],
+        titles: &[
+            "scene, ms",
+            "find",
+            "composite 2",
+            "ratio",
+            "8 at once",
+            "8 in turn",
+            "ratio",
+            "write",
+            "read",
+            "kB",
+            "bytes a face",
+            "window reads",
+        ],
+        row: stored,
+    },
     Measurement {
         name: "n-et",
         scenes: &["radial", "buildings", "balls3", "balls7"],
@@ -230,6 +258,25 @@ fn against_zbuffer(case: &Case) -> Vec<String> {
         ms(z_picture),
         ms(exact),
         format!("{:.1}", exact / z_picture),
+    ]
+}
+
+/// Stored maps beside finding what is seen.
+fn stored(case: &Case) -> Vec<String> {
+    let times = stored_times(case);
+    vec![
+        case.title(),
+        ms(times.find),
+        ms(times.two),
+        format!("{:.2}", times.two / times.find),
+        ms(times.eight),
+        ms(times.chain),
+        format!("{:.2}", times.eight / times.chain),
+        ms(times.write),
+        ms(times.read),
+        (times.bytes / 1000).to_string(),
+        format!("{:.0}", times.bytes_per_face),
+        format!("{:.3}", times.window),
     ]
 }
 

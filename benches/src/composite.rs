@@ -1,0 +1,109 @@
+//! Stored maps: what writing, reading and compositing them costs beside finding what is seen.
+
+use crate::cases::Case;
+use crate::timing::{least_times, milliseconds};
+use std::hint::black_box;
+use std::io::Cursor;
+use veduta::composite::composite;
+use veduta::geometry::DVec2;
+use veduta::map::SeenScene;
+use veduta::map::file::{MapReader, write_map};
+use veduta::pipeline::find_visibility;
+use veduta::scene::{MeshId, Scene};
+
+/// Rounds of measuring.
+const ROUNDS: u32 = 3;
+
+/// Times in milliseconds, and what they are of.
+#[derive(Clone, Copy, Debug)]
+pub struct StoredTimes {
+    /// Finding what is seen of all faces, projection included.
+    pub find: f64,
+    /// Compositing the maps of two halves of the faces.
+    pub two: f64,
+    /// Compositing eight maps at once, and one after the other.
+    pub eight: f64,
+    /// Eight maps, each added to what there was.
+    pub chain: f64,
+    /// Writing the map into memory, and reading it.
+    pub write: f64,
+    /// Reading it.
+    pub read: f64,
+    /// Bytes of the file.
+    pub bytes: usize,
+    /// Bytes of a face that is stored.
+    pub bytes_per_face: f64,
+    /// Share of the bytes that a window of a sixteenth of the frame reads.
+    pub window: f64,
+}
+
+/// Measures a case whose faces are dealt to files in blocks, as parts of a model would be.
+pub fn stored_times(case: &Case) -> StoredTimes {
+    let size = [case.width, case.height];
+    let seen = |scene: &Scene| SeenScene::of(scene, &find_visibility(scene, &case.camera), size);
+    let all = seen(&case.scene);
+    let maps =
+        |count: u32| -> Vec<SeenScene> { dealt(&case.scene, count).iter().map(seen).collect() };
+    let (halves, eighths) = (maps(2), maps(8));
+    let bytes = written(&all);
+    let read =
+        |bytes: &[u8]| MapReader::new(Cursor::new(bytes.to_vec())).and_then(|mut map| map.read());
+    let merged = |maps: &[SeenScene]| composite(maps).expect("maps of one camera");
+    let [find, two, eight, chain, write, read] = least_times(
+        ROUNDS,
+        [
+            &mut || drop(black_box(find_visibility(&case.scene, &case.camera))),
+            &mut || drop(black_box(merged(&halves))),
+            &mut || drop(black_box(merged(&eighths))),
+            &mut || {
+                let next = |sum: SeenScene, map: &SeenScene| merged(&[sum, map.clone()]);
+                black_box(eighths[1..].iter().fold(eighths[0].clone(), next));
+            },
+            &mut || drop(black_box(written(&all))),
+            &mut || drop(black_box(read(&bytes).expect("sound"))),
+        ],
+    )
+    .map(milliseconds);
+    let mut reader = MapReader::new(Cursor::new(bytes.as_slice())).expect("sound");
+    let window = [DVec2::splat(0.5), DVec2::splat(0.75)];
+    reader.read_window(window).expect("sound");
+    StoredTimes {
+        find,
+        two,
+        eight,
+        chain,
+        write,
+        read,
+        bytes: bytes.len(),
+        bytes_per_face: bytes.len() as f64 / all.map.faces.len().max(1) as f64,
+        window: reader.bytes_read() as f64 / bytes.len() as f64,
+    }
+}
+
+fn written(seen: &SeenScene) -> Vec<u8> {
+    let out = write_map(Cursor::new(Vec::new()), seen, &[]);
+    out.expect("memory takes all").into_inner()
+}
+
+/// The faces of each object, dealt to `count` scenes in blocks.
+fn dealt(scene: &Scene, count: u32) -> Vec<Scene> {
+    let part = |part: u32| {
+        let mut dealt = scene.clone();
+        dealt.meshes.clear();
+        dealt.objects.clear();
+        for object in &scene.objects {
+            let mesh = &scene.meshes[object.mesh.0 as usize];
+            let total = mesh.face_count() as u64;
+            let border = |part: u32| (total * u64::from(part) / u64::from(count)) as u32;
+            let faces: Vec<u32> = (border(part)..border(part + 1)).collect();
+            if !faces.is_empty() {
+                let mut object = object.clone();
+                object.mesh = MeshId(dealt.meshes.len() as u32);
+                dealt.objects.push(object);
+                dealt.meshes.push(mesh.selected(&faces));
+            }
+        }
+        dealt
+    };
+    (0..count).map(part).collect()
+}
