@@ -3,6 +3,7 @@
 use crate::excerpt::with_excerpts;
 use std::fmt;
 use std::io::{self, IsTerminal};
+use veduta_io::deep_exr::DeepProblem;
 use veduta_io::{ErrorKind, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem};
 
 /// Exit codes. `0` is success, `130` an interrupt.
@@ -88,7 +89,9 @@ impl From<ReadPictureError> for Failure {
     fn from(error: ReadPictureError) -> Self {
         let code = match error.problem {
             PictureProblem::Unreadable(_) => Code::InputOutput,
-            PictureProblem::UnknownFormat(_) | PictureProblem::Unsupported(_) => Code::Unsupported,
+            PictureProblem::UnknownFormat(_)
+            | PictureProblem::Unsupported(_)
+            | PictureProblem::Deep(DeepProblem::Unsupported { .. }) => Code::Unsupported,
             _ => Code::BadInput,
         };
         Self::new(code, error.to_string())

@@ -7,6 +7,8 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
+#[cfg(feature = "exr")]
+pub mod deep_exr;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",

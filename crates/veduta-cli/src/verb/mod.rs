@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod completions;
+mod deep;
 pub mod diff;
 pub mod examples;
 pub mod info;

@@ -57,6 +57,10 @@ pub enum PictureProblem {
     /// A kind of the format that is not read.
     #[error("is of a kind that is not read: {0}; convert it to .png or .exr")]
     Unsupported(String),
+    /// What is wrong with a deep OpenEXR.
+    #[cfg(feature = "exr")]
+    #[error("{0}")]
+    Deep(crate::deep_exr::DeepProblem),
     /// More pixels than a file of that length can honestly hold, or than fit in memory.
     #[error(
         "says that it has {width} x {height} pixels, too many for {input} bytes; it is damaged"
@@ -91,7 +95,7 @@ pub fn read_picture(path: &Path) -> Result<LoadedPicture, ReadPictureError> {
             #[cfg(feature = "tiff")]
             PictureFormat::Tiff => tiff::read(&bytes),
             #[cfg(feature = "exr")]
-            PictureFormat::Exr => exr::read(&bytes),
+            PictureFormat::Exr => exr::read(bytes),
             PictureFormat::Pfm => pfm::read(&bytes),
             PictureFormat::Npy => npy::read(&bytes),
         };

@@ -28,7 +28,8 @@ mod webp;
 pub use model::{MODEL_SUFFIXES, write_model};
 pub use partial_file::remove_unfinished;
 
-use partial_file::PartialFile;
+pub(crate) use partial_file::PartialFile;
+
 use std::fmt;
 use std::io::{self, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -337,7 +338,7 @@ pub fn stream_picture(
 }
 
 /// Whether something stands at `path` that is written to rather than replaced.
-fn is_stream(path: &Path) -> bool {
+pub(crate) fn is_stream(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
