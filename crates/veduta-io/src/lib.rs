@@ -9,6 +9,8 @@
 
 #[cfg(feature = "exr")]
 pub mod deep_exr;
+#[cfg(feature = "exr")]
+pub mod depth_picture;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",

@@ -444,9 +444,9 @@ impl<'a> Attributes<'a> {
             6 | 7 => "deep data with compression b44".to_owned(),
             8 | 9 => "deep data with compression dwa".to_owned(),
             10 | 11 => "deep data with compression htj2k".to_owned(),
-            other => format!(
-                "deep data with compression {other}, newer than this reader (Zstandard, perhaps)"
-            ),
+            12 => "deep data with compression lj2k".to_owned(),
+            13 => "deep data with compression zstd".to_owned(),
+            other => format!("deep data with compression {other}, newer than this reader"),
         };
         Err(value.unsupported(what, CONVERT))
     }

@@ -75,7 +75,7 @@ impl From<DeepProblem> for PictureProblem {
     }
 }
 
-fn problem(error: Error) -> PictureProblem {
+pub fn problem(error: Error) -> PictureProblem {
     match error {
         Error::NotSupported(message) => PictureProblem::Unsupported(message.into_owned()),
         other => PictureProblem::Damaged(other.to_string().replace('\n', " ")),
