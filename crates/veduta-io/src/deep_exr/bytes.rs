@@ -1,5 +1,13 @@
 use super::{DeepPlace, DeepProblem};
 
+/// Text of a file, short enough to be told in a sentence.
+pub fn shown(text: &str) -> String {
+    const MOST: usize = 40;
+    let start: String = text.chars().take(MOST).collect();
+    let more = if start.len() < text.len() { "…" } else { "" };
+    format!("{:?}", start + more)
+}
+
 /// Reads little-endian numbers from the bytes of a file, and knows where it is.
 #[derive(Clone, Debug)]
 pub struct Bytes<'a> {

@@ -2,6 +2,7 @@
 
 use super::header::Channel;
 use super::image::{DeepPixels, Samples};
+use super::read::Budget;
 use super::tidy::{PixelSamples, Roles, Tidier, layer_and_base, opacity_of};
 use super::{DeepFile, DeepHeader, DeepImage, DeepProblem};
 use rayon::prelude::*;
@@ -159,8 +160,12 @@ impl DeepFile {
         let size =
             |count: u64| u32::try_from(count).expect("a picture of at most 2^32 pixels a side");
         let mut pixels = Vec::new();
+        let mut budget = Budget::of_input(self.len());
         for band in 0..self.band_count(part) {
-            pixels.extend(flattener.flatten(&self.read_band(part, band)?));
+            // Samples are dropped after each band, pixels are not.
+            let rows = self.read_band(part, band)?;
+            budget.charge((rows.rows() * rows.width()).saturating_mul(size_of::<[f32; 4]>()))?;
+            pixels.extend(flattener.flatten(&rows));
         }
         let picture = Picture {
             width: size(header.data_window.width()),

@@ -1,6 +1,6 @@
 //! The header of a part: attributes, each with its name, its type and its bytes.
 
-use super::bytes::Bytes;
+use super::bytes::{Bytes, shown};
 use super::image::{SampleType, Window};
 use super::{DeepProblem, camera_from_matrices};
 use veduta::map::Camera;
@@ -288,7 +288,10 @@ pub fn read_part(
         let kind = bytes.name(most_name, "an attribute's type")?;
         let size = bytes.i32("an attribute's size")?;
         let Ok(size) = usize::try_from(size) else {
-            return Err(bytes.damaged(format!("attribute {name:?} has a size of {size} bytes")));
+            return Err(bytes.damaged(format!(
+                "attribute {} has a size of {size} bytes",
+                shown(&name)
+            )));
         };
         let at = bytes.at();
         let value = bytes.take(size, "an attribute's value")?;
@@ -332,8 +335,8 @@ impl<'a> Attributes<'a> {
         };
         let value = self.bytes.within(found.at, found.value.len());
         if found.kind != kind {
-            let other = &found.kind;
-            return Err(value.damaged(format!("attribute {name:?} is {other:?}, not {kind:?}")));
+            let other = shown(&found.kind);
+            return Err(value.damaged(format!("attribute {name:?} is {other}, not {kind:?}")));
         }
         Ok(Some(value))
     }
@@ -373,7 +376,7 @@ impl<'a> Attributes<'a> {
                 return Err(DeepProblem::NotDeep);
             }
             Some(other) => {
-                let what = format!("a part of type {other:?}");
+                let what = format!("a part of type {}", shown(other));
                 return Err(self.bytes.unsupported(what, OTHER_PROGRAM));
             }
             None => return Err(self.bytes.damaged("attribute \"type\" is missing")),
@@ -464,17 +467,20 @@ impl<'a> Attributes<'a> {
                 1 => SampleType::Half,
                 2 => SampleType::Float,
                 other => {
-                    return Err(value.damaged(format!("channel {name:?} has type {other}")));
+                    return Err(value.damaged(format!("channel {} has type {other}", shown(&name))));
                 }
             };
             value.take(4, "a channel's flags")?;
             let sampling = [value.i32("its sampling")?, value.i32("its sampling")?];
             if sampling != [1, 1] {
-                let what = format!("deep channel {name:?} with a sampling of {sampling:?}");
+                let what = format!(
+                    "deep channel {} with a sampling of {sampling:?}",
+                    shown(&name)
+                );
                 return Err(value.damaged(what));
             }
             if channels.last().is_some_and(|last| last.name >= name) {
-                return Err(value.damaged(format!("channel {name:?} is out of order")));
+                return Err(value.damaged(format!("channel {} is out of order", shown(&name))));
             }
             channels.push(Channel { name, sample_type });
         }

@@ -288,30 +288,14 @@ impl DeepPixels {
         }
     }
 
-    /// Adds `count` pixels without samples; as for [`DeepPixels::extend_from`].
-    pub(super) fn extend_empty(&mut self, count: usize) {
-        let end = self.sample_count();
-        self.ends.extend(std::iter::repeat_n(end, count));
-    }
-
-    /// Adds pixels by their counts as files have them: each with all before it in its row. Their
-    /// samples are to be filled in by [`DeepPixels::fill_from_bytes`]. Errors say what is wrong.
-    pub(super) fn push_counts(&mut self, counts: &[[u8; 4]], width: usize) -> Result<(), String> {
-        for row in counts.chunks(width) {
-            let start = self.sample_count();
-            let mut before = 0;
-            for (column, &count) in row.iter().enumerate() {
-                let count = i32::from_le_bytes(count);
-                if count < before {
-                    return Err(format!(
-                        "{count} samples up to column {column}, after {before}"
-                    ));
-                }
-                before = count;
-                self.ends.push(start + count as usize);
-            }
-        }
-        Ok(())
+    /// Adds pixels with these counts. Their samples are to be filled in by
+    /// [`DeepPixels::fill_from_bytes`].
+    pub(super) fn extend_counts(&mut self, counts: impl IntoIterator<Item = u32>) {
+        let mut end = self.sample_count();
+        self.ends.extend(counts.into_iter().map(|count| {
+            end += count as usize;
+            end
+        }));
     }
 
     /// Fills in the samples as files have them: row by row, in each row channel after channel.

@@ -28,6 +28,11 @@ pub fn unpack(
     if packed.len() == size {
         return Ok(Cow::Borrowed(packed));
     }
+    expand(compression, packed, size).map(Cow::Owned)
+}
+
+/// Unpacks a block that is known not to be stored as it is; else as [`unpack`].
+pub fn expand(compression: DeepCompression, packed: &[u8], size: usize) -> Result<Vec<u8>, String> {
     let most = match compression {
         DeepCompression::None => 1,
         DeepCompression::Rle => MOST_OF_RUNS,
@@ -52,7 +57,7 @@ pub fn unpack(
         ));
     }
     undo_differences(&mut unpacked);
-    Ok(Cow::Owned(interleave(&unpacked)))
+    Ok(interleave(&unpacked))
 }
 
 /// Packs a block; as it is, where that is no longer.

@@ -9,8 +9,8 @@
 use super::bytes::Bytes;
 use super::header::{Layout, PartHeader, read_part};
 use super::image::{DeepImage, DeepPixels};
-use super::packing::unpack;
-use super::{DeepError, DeepHeader, DeepProblem};
+use super::packing::{expand, unpack};
+use super::{DeepCompression, DeepError, DeepHeader, DeepProblem};
 use std::ops::Range;
 use std::path::Path;
 
@@ -203,7 +203,7 @@ impl DeepFile {
         Ok(DeepImage { header, pixels })
     }
 
-    /// Reads the rows of a band.
+    /// Reads the rows of a band, in memory that is bounded as if the file had no other.
     ///
     /// # Errors
     /// As for [`DeepFile::read`].
@@ -284,34 +284,110 @@ impl DeepFile {
         let samples_size = size("the size of the samples")?;
 
         let compression = part.header.compression;
+        let bytes_of_sample = part.header.bytes_of_sample();
         let pixel_count = usize::try_from(width.saturating_mul(rows)).unwrap_or(usize::MAX);
         let packed = bytes.take(packed_counts, "the table of counts")?;
-        let damaged_counts = |what: String| bytes.damaged(format!("the table of counts: {what}"));
+        let table = TableOfCounts {
+            width: width as usize,
+            pixel_count,
+            bytes_of_sample,
+            samples_size,
+        };
+        let ends = pixel_count.saturating_mul(size_of::<usize>());
         let mut pixels = DeepPixels::new(width as usize, part.header.sample_types());
         if packed.is_empty() {
-            // A chunk without samples need not have a table; then nothing bounds its pixels.
-            budget.charge(pixel_count.saturating_mul(size_of::<usize>()))?;
-            pixels.extend_empty(pixel_count);
+            // A chunk without samples need not have a table; then the budget alone bounds its pixels.
+            table.check_total(0).map_err(|what| bytes.damaged(what))?;
+            budget.charge(ends)?;
+            pixels.extend_counts(std::iter::repeat_n(0, pixel_count));
         } else {
-            let size = pixel_count.saturating_mul(4);
-            let counts = unpack(compression, packed, size).map_err(damaged_counts)?;
-            budget.charge(pixel_count.saturating_mul(size_of::<usize>()))?;
-            pixels
-                .push_counts(counts.as_chunks::<4>().0, width as usize)
-                .map_err(damaged_counts)?;
-        }
-
-        let due = (pixels.sample_count()).saturating_mul(part.header.bytes_of_sample());
-        if due != samples_size {
-            let what = format!("{samples_size} bytes of samples, but the counts tell {due}");
-            return Err(bytes.damaged(what));
+            let counts = table.unpack(compression, packed, part.layout);
+            let counts = counts.map_err(|what| bytes.damaged(what))?;
+            budget.charge(ends)?;
+            pixels.extend_counts(counts);
         }
         let packed = bytes.take(packed_samples, "the samples")?;
-        budget.charge(samples_size)?;
         let samples = unpack(compression, packed, samples_size)
             .map_err(|what| bytes.damaged(format!("the samples: {what}")))?;
+        // Twice: as bytes, and as samples.
+        budget.charge(samples_size)?;
         pixels.fill_from_bytes(&samples);
         Ok(pixels)
+    }
+}
+
+/// What the table of counts of a chunk must come to.
+struct TableOfCounts {
+    /// Pixels of a row.
+    width: usize,
+    pixel_count: usize,
+    bytes_of_sample: usize,
+    /// Bytes of all samples.
+    samples_size: usize,
+}
+
+impl TableOfCounts {
+    /// Unpacks the table: the samples of each pixel. Errors say what is wrong, as a clause.
+    fn unpack(
+        &self,
+        compression: DeepCompression,
+        packed: &[u8],
+        layout: Layout,
+    ) -> Result<Vec<u32>, String> {
+        let size = self.pixel_count.saturating_mul(4);
+        let counts = unpack(compression, packed, size)
+            .map_err(|what| format!("the table of counts: {what}"))
+            .and_then(|table| self.counts(&table));
+        let Layout::Tiles { width, height, .. } = layout else {
+            return counts;
+        };
+        counts.or_else(|problem| {
+            // OpenEXR's writer (`ImfDeepTiledOutputFile.cpp`, 2.0 to 3.5) asks of tiles cut off by the
+            // border whether their table shrinks below that of a whole one. So it may be packed and yet
+            // as long as if it were not; or not packed, and as long as that of a whole tile.
+            let whole = 4 * width as usize * height as usize;
+            let counts = if packed.len() == size {
+                expand(compression, packed, size).and_then(|table| self.counts(&table))
+            } else if packed.len() == whole && size < whole {
+                self.counts(&packed[..size])
+            } else {
+                return Err(problem);
+            };
+            counts.map_err(|_| problem)
+        })
+    }
+
+    /// The counts of a table, which tells of each pixel those of all before it in its row too.
+    fn counts(&self, table: &[u8]) -> Result<Vec<u32>, String> {
+        let mut counts = Vec::with_capacity(self.pixel_count);
+        let mut total = 0_u64;
+        for row in table.as_chunks::<4>().0.chunks(self.width) {
+            let mut before = 0;
+            for (column, &count) in row.iter().enumerate() {
+                let count = i32::from_le_bytes(count);
+                if count < before {
+                    return Err(format!(
+                        "the table of counts: {count} samples up to column {column}, after {before}"
+                    ));
+                }
+                counts.push((count - before) as u32);
+                before = count;
+            }
+            total += u64::from(before.unsigned_abs());
+        }
+        self.check_total(total)?;
+        Ok(counts)
+    }
+
+    fn check_total(&self, samples: u64) -> Result<(), String> {
+        let due = samples.saturating_mul(self.bytes_of_sample as u64);
+        let told = self.samples_size;
+        if due != told as u64 {
+            return Err(format!(
+                "{told} bytes of samples, but the counts tell {due}"
+            ));
+        }
+        Ok(())
     }
 }
 
@@ -320,7 +396,7 @@ impl DeepFile {
 /// Deflate makes up to 1032 bytes of one, but no honest picture is that dull throughout: blank ones,
 /// and those of one colour at one depth, come to about 400.
 #[derive(Debug)]
-struct Budget {
+pub struct Budget {
     input: u64,
     left: u64,
 }
@@ -332,7 +408,7 @@ const FREE: u64 = 256 << 20;
 const PER_INPUT_BYTE: u64 = 256;
 
 impl Budget {
-    fn of_input(input: usize) -> Self {
+    pub fn of_input(input: usize) -> Self {
         let input = input as u64;
         Self {
             input,
@@ -340,7 +416,7 @@ impl Budget {
         }
     }
 
-    fn charge(&mut self, bytes: usize) -> Result<(), DeepProblem> {
+    pub fn charge(&mut self, bytes: usize) -> Result<(), DeepProblem> {
         let refusal = DeepProblem::TooLarge {
             asked: bytes as u64,
             input: self.input,
