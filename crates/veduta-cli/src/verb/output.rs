@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
 use veduta_io::deep_exr::DeepCompression;
 use veduta_io::{
-    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
+    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem, is_map,
     stream_picture, write_picture_as,
 };
 
@@ -100,7 +100,13 @@ enum Place {
 }
 
 impl Output {
-    /// The place asked for, if one is.
+    /// The place of a stored map, if one is asked for.
+    pub fn map_place(&self) -> Option<&Path> {
+        let output = self.output.as_deref();
+        output.filter(|output| self.format.is_none() && is_map(output))
+    }
+
+    /// The place of a picture asked for, if one is.
     pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);

@@ -1,18 +1,19 @@
 use super::deep::DeepTarget;
 use super::look::Look;
 use super::output::{Output, Target};
-use super::{Reading, load, unknown_name};
+use super::stored::{refuse_place, summary, tell_work};
+use super::{Reading, load, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
 use crate::values::{self, FieldOfView, Size};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use veduta::map::{Camera, Projection};
-use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
+use veduta::map::{Camera, Projection, SeenScene};
+use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Loaded, scaled};
+use veduta_io::{Loaded, scaled, source_of, write_map};
 
 /// Make a picture of a model
 ///
@@ -67,6 +68,8 @@ Examples:
       veduta render town.obj -o town.exr --depth half --tile 64
   All that is seen in each pixel, with depths and ids, for deep compositing:
       veduta render town.obj -o deep.exr --deep --depth half
+  What is seen, kept for any number of pictures:
+      veduta render town.obj -o kept.veduta
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -108,7 +111,10 @@ impl Render {
     /// Width and height in pixels where none are given.
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
-    pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+    pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if let Some(place) = self.output.map_place() {
+            return self.run_to_map(place, force, json, talk);
+        }
         let target = self.output.target(json)?;
         let deep_target = self.deep_target(&target)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
@@ -148,7 +154,7 @@ impl Render {
             mut picture,
             shortcomings,
         } = pipeline::render(&scene, &camera, &settings, |step| tell_step(step, talk));
-        self.tell_shortcomings(&scene, &shortcomings, talk)?;
+        tell_shortcomings(&self.model, &scene, &shortcomings, self.strict, talk)?;
         talk.begin("developing");
         // Before it is developed, since pictures are scaled in linear light.
         let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
@@ -220,7 +226,7 @@ impl Render {
         };
         let (samples, shortcomings) = target.write(scene, camera, &settings, talk)?;
         talk.end();
-        self.tell_shortcomings(scene, &shortcomings, talk)?;
+        tell_shortcomings(&self.model, scene, &shortcomings, self.strict, talk)?;
         talk.detail(format_args!(
             "{} faces, {samples} samples",
             scene.face_count()
@@ -233,6 +239,46 @@ impl Render {
                 "samples": samples,
                 "warnings": talk.warnings(),
             });
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// Stores what is seen instead of showing it.
+    fn run_to_map(
+        &self,
+        place: &Path,
+        force: bool,
+        json: bool,
+        talk: &mut Talk,
+    ) -> Result<(), Failure> {
+        refuse_place(place, force)?;
+        if self.output.preview.is_some() || self.sampling != Sampling::Exact || self.deep {
+            let message =
+                "a map is of no picture: --preview, --sampling and --deep are not for .veduta";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let source = source_of(&self.model)?;
+        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
+        talk.begin("finding visibility");
+        let map = pipeline::find_visibility(&scene, &camera);
+        let seen = SeenScene::of(&scene, &map, [size.width, size.height]);
+        talk.begin("writing");
+        write_map(place, &seen, &[source])?;
+        talk.end();
+        talk.detail(format_args!("{}", summary(&seen)));
+        if json {
+            let mut told = serde_json::json!({
+                "output": place.to_string_lossy(),
+                "size": seen.size,
+                "faces": scene.face_count(),
+                "facesSeen": seen.map.faces.len(),
+                "warnings": talk.warnings(),
+            });
+            tell_work(&mut told);
             print(&format!("{told}\n"))?;
         }
         Ok(())
@@ -255,34 +301,6 @@ impl Render {
             }
         }
         scene.keep_layers(|layer| self.layer.contains(&layer.name));
-        Ok(())
-    }
-
-    /// Warns of what the picture will not show as it should; if strict, fails.
-    fn tell_shortcomings(
-        &self,
-        scene: &Scene,
-        shortcomings: &[Shortcoming],
-        talk: &mut Talk,
-    ) -> Result<(), Failure> {
-        let model = self.model.display();
-        for shortcoming in shortcomings {
-            let message = match shortcoming {
-                Shortcoming::DrawnOpaque(material) => {
-                    let name = &scene.material(*material).name;
-                    format!("{model}: the material {name:?} is not opaque, but drawn so")
-                }
-                Shortcoming::VeilsLeftOut(count) => {
-                    format!("{model}: {count} pieces of surfaces that are not opaque are left out")
-                }
-                other => format!("{model}: not shown as it should be: {other:?}"),
-            };
-            if self.strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::Unsupported, message));
-            }
-            talk.warn(message);
-        }
         Ok(())
     }
 }

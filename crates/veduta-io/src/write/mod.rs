@@ -26,9 +26,8 @@ mod tiff;
 mod webp;
 
 pub use model::{MODEL_SUFFIXES, write_model};
-pub use partial_file::remove_unfinished;
-
 pub(crate) use partial_file::PartialFile;
+pub use partial_file::remove_unfinished;
 
 use std::fmt;
 use std::io::{self, Cursor, Seek, Write};
