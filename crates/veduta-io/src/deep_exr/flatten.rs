@@ -125,8 +125,8 @@ impl Flattener {
 impl DeepImage {
     /// The flat picture of the data window: linear, premultiplied.
     ///
-    /// Samples may be in any order and overlap. Samples of equal opacity that coincide and are opaque
-    /// give the mean of their colours.
+    /// Samples may be in any order and overlap. Opaque ones that coincide give the mean of their
+    /// colours.
     ///
     /// # Errors
     /// Without channel Z, or without opacity.

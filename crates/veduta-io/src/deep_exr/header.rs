@@ -371,9 +371,9 @@ impl<'a> Attributes<'a> {
                 let chunks = self.chunk_count()?.ok_or_else(missing)?;
                 return Ok(PartHeader::Flat { chunks });
             }
-            // Files of one flat part need not tell their type.
-            Some("scanlineimage" | "tiledimage") | None if !several => {
-                return Err(DeepProblem::NotDeep);
+            Some(flat @ ("scanlineimage" | "tiledimage")) => {
+                let what = format!("the file says that it is deep, but its part is a {flat}");
+                return Err(self.bytes.damaged(what));
             }
             Some(other) => {
                 let what = format!("a part of type {}", shown(other));

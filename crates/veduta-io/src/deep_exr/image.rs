@@ -131,8 +131,8 @@ impl Samples {
         }
     }
 
-    /// Adds a number, rounded to the type. What is brighter than half floats can tell becomes the
-    /// brightest they can, since infinities would spread through all that follows.
+    /// Adds a number, rounded to the type. What is finite and brighter than half floats can tell becomes
+    /// the brightest they can, since infinities would spread through all that follows.
     pub fn push(&mut self, value: f64) {
         match self {
             Self::Uint(samples) => samples.push(value as u32),
