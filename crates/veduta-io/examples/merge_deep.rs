@@ -3,11 +3,22 @@
 
 use std::io::BufWriter;
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::time::Instant;
 use veduta_io::deep_exr::{DeepWriter, merge, read_deep};
 use veduta_io::write_picture;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("merge_deep: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn std::error::Error>> {
     let (mut places, mut flat): (Vec<PathBuf>, _) = (Vec::new(), None);
     for argument in std::env::args_os().skip(1) {
         match argument

@@ -43,7 +43,9 @@ fn a_pipe_gets_the_same_bytes_as_a_file() {
     let folder = Folder::new();
     let render = format!("render town.obj {FACING} --deep");
     folder.told(&format!("{render} -o deep.exr"));
-    let piped = folder.veduta(&format!("{render} -o - --format exr")).output();
+    let piped = folder
+        .veduta(&format!("{render} -o - --format exr"))
+        .output();
     let piped = piped.expect("it runs").stdout;
     assert!(piped == folder.read("deep.exr"));
 }

@@ -3,7 +3,7 @@
 use super::header::Channel;
 use super::image::{DeepPixels, Samples};
 use super::read::Budget;
-use super::tidy::{PixelSamples, Roles, Tidier, layer_and_base, opacity_of};
+use super::tidy::{PixelSamples, Roles, Tidier, layer_and_base, opacity_of, within_0_and_1};
 use super::{DeepFile, DeepHeader, DeepImage, DeepProblem};
 use rayon::prelude::*;
 use veduta::accumulate::Picture;
@@ -108,10 +108,10 @@ impl Flattener {
         for sample in values.chunks_exact(self.used.len()) {
             for k in 0..3 {
                 color[k] += through[k] * self.colors[k].map_or(0.0, |channel| sample[channel]);
-                through[k] *= 1.0 - sample[self.opacities[k]].max(0.0).min(1.0);
+                through[k] *= 1.0 - within_0_and_1(sample[self.opacities[k]]);
             }
             if let Some(channel) = self.opacity {
-                whole_through *= 1.0 - sample[channel].max(0.0).min(1.0);
+                whole_through *= 1.0 - within_0_and_1(sample[channel]);
             }
         }
         let opacity = match self.opacity {

@@ -303,6 +303,11 @@ impl Tidier {
     }
 }
 
+/// An opacity as it may be: what is no number hides nothing.
+pub fn within_0_and_1(opacity: f64) -> f64 {
+    if opacity > 0.0 { opacity.min(1.0) } else { 0.0 }
+}
+
 /// Whether two samples, sorted, neither overlap nor coincide.
 fn are_apart(near: [f64; 2], far: [f64; 2]) -> bool {
     // A point and a volume that begins where it is are apart; two points at one depth are not.
@@ -317,9 +322,8 @@ struct Medium<'a> {
 }
 
 impl Medium<'_> {
-    /// Opacity from 0 to 1; what is no number is none.
     fn opacity(&self, channel: usize) -> f64 {
-        self.values[channel].max(0.0).min(1.0)
+        within_0_and_1(self.values[channel])
     }
 
     /// Writes what it adds to the sums: for each channel the density or the colour given off on a unit

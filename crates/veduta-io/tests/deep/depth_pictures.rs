@@ -95,6 +95,9 @@ fn assert_is_scene(found: &DepthPicture, case: &str) {
     }
 }
 
+/// A kind of depth, and what it tells of a pixel in which the planar depth is so much.
+type Told<'a> = (DepthKind, &'a dyn Fn(usize, f64) -> f64);
+
 #[test]
 fn all_kinds_of_depth_become_planar_metres() {
     let (near, far) = (0.5_f64, 100.0_f64);
@@ -105,7 +108,7 @@ fn all_kinds_of_depth_become_planar_metres() {
     };
     let kept = |z: f64| far * (z - near) / (z * (far - near));
     let slant = |index| camera().eye_ray(middle(index)).1.length();
-    let kinds: [(DepthKind, &dyn Fn(usize, f64) -> f64); 5] = [
+    let kinds: [Told; 5] = [
         (DepthKind::Planar, &|_, z| z),
         (DepthKind::Ray, &|index, z| z * slant(index)),
         (DepthKind::Inverse, &|_, z| 1.0 / z),
