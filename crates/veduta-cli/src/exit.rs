@@ -4,6 +4,7 @@ use crate::excerpt::with_excerpts;
 use std::fmt;
 use std::io::{self, IsTerminal};
 use veduta::map::file::FileError;
+use veduta_io::deep_exr::DeepProblem;
 use veduta_io::{
     ErrorKind, MapFileError, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem,
 };
@@ -105,7 +106,9 @@ impl From<ReadPictureError> for Failure {
     fn from(error: ReadPictureError) -> Self {
         let code = match error.problem {
             PictureProblem::Unreadable(_) => Code::InputOutput,
-            PictureProblem::UnknownFormat(_) | PictureProblem::Unsupported(_) => Code::Unsupported,
+            PictureProblem::UnknownFormat(_)
+            | PictureProblem::Unsupported(_)
+            | PictureProblem::Deep(DeepProblem::Unsupported { .. }) => Code::Unsupported,
             _ => Code::BadInput,
         };
         Self::new(code, error.to_string())

@@ -7,6 +7,10 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
+#[cfg(feature = "exr")]
+pub mod deep_exr;
+#[cfg(feature = "exr")]
+pub mod depth_picture;
 mod map_file;
 #[cfg(any(
     feature = "gltf",

@@ -1,5 +1,9 @@
 //! The order of the stages: the only file that knows it.
 
+mod deep;
+
+pub use deep::render_deep;
+
 use crate::accumulate::{self, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};
 use crate::scene::{AlphaMode, Scene};

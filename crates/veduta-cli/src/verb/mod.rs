@@ -3,6 +3,7 @@
 pub mod check;
 pub mod completions;
 pub mod composite;
+mod deep;
 pub mod diff;
 pub mod examples;
 pub mod info;

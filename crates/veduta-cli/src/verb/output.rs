@@ -1,5 +1,6 @@
 //! Where a picture goes, and as what.
 
+use super::deep::DeepTarget;
 use crate::exit::{Code, Failure};
 use crate::preview::Style;
 use crate::values::Size;
@@ -7,6 +8,7 @@ use clap::{Args, ValueEnum};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
+use veduta_io::deep_exr::DeepCompression;
 use veduta_io::{
     ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem, is_map,
     stream_picture, write_picture_as,
@@ -154,6 +156,32 @@ impl Output {
         }))
     }
 
+    /// `target` for a deep picture.
+    pub fn deep_target<'a>(&self, target: &'a Target) -> Result<DeepTarget<'a>, Failure> {
+        let usage = |message: &str| Err(Failure::new(Code::Usage, message));
+        if target.format != PictureFormat::Exr {
+            return usage("a deep picture is stored as .exr; name one with -o");
+        }
+        if self.tile.is_some() {
+            return usage("a deep picture is stored in scanlines; leave --tile out");
+        }
+        let compression = match self.compression {
+            None | Some(CompressionArgument::Zips) => DeepCompression::Zips,
+            Some(CompressionArgument::None) => DeepCompression::None,
+            Some(CompressionArgument::Rle) => DeepCompression::Rle,
+            Some(_) => {
+                return usage("a deep picture is compressed by --compression zips, rle or none");
+            }
+        };
+        // The format's habit is floats.
+        let samples = target.options.samples.unwrap_or(Samples::F32);
+        Ok(DeepTarget {
+            target,
+            compression,
+            samples,
+        })
+    }
+
     fn options(&self) -> PictureOptions {
         let usual = PictureOptions::default();
         PictureOptions {
@@ -205,19 +233,20 @@ impl Target {
         }
     }
 
+    /// The file, unless it is stdout.
+    pub fn file(&self) -> Option<&Path> {
+        match &self.place {
+            Place::Stdout => None,
+            Place::File(path) => Some(path),
+        }
+    }
+
     /// Writes the picture there.
     pub fn write(&self, picture: &Picture) -> Result<(), Failure> {
         let Place::File(path) = &self.place else {
             let mut stdout = io::stdout().lock();
-            return match stream_picture(&mut stdout, self.format, picture, &self.options) {
-                Ok(()) => Ok(()),
-                // Who reads has read enough: `veduta render … -o - | head`.
-                Err(WriteProblem::Io(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-                Err(problem) => Err(Failure::new(
-                    Code::InputOutput,
-                    format!("stdout: {problem}"),
-                )),
-            };
+            let written = stream_picture(&mut stdout, self.format, picture, &self.options);
+            return written.or_else(written_to_stdout);
         };
         Ok(write_picture_as(path, self.format, picture, &self.options)?)
     }
@@ -228,6 +257,18 @@ impl Target {
             Place::Stdout => "-".to_owned(),
             Place::File(path) => path.to_string_lossy().into_owned(),
         }
+    }
+}
+
+/// What a failure to write to stdout means.
+pub fn written_to_stdout(problem: WriteProblem) -> Result<(), Failure> {
+    match problem {
+        // Who reads has read enough: `veduta render … -o - | head`.
+        WriteProblem::Io(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        problem => Err(Failure::new(
+            Code::InputOutput,
+            format!("stdout: {problem}"),
+        )),
     }
 }
 

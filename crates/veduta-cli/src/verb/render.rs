@@ -1,5 +1,6 @@
+use super::deep::DeepTarget;
 use super::look::Look;
-use super::output::Output;
+use super::output::{Output, Target};
 use super::stored::{refuse_place, summary, tell_work};
 use super::{Reading, load, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
@@ -35,6 +36,14 @@ pub struct Render {
     /// How areas in pixels are found: exact, or multiscan:N for N sub-scanlines a pixel
     #[arg(long, value_name = "HOW", default_value = "exact", value_parser = values::sampling)]
     sampling: Sampling,
+    /// Keep of each pixel all that is seen in it, each face with its depth and its object's id: a deep
+    /// .exr, which lays flat to the same picture
+    #[arg(
+        long,
+        requires = "output",
+        conflicts_with_all = ["preview", "background", "exposure", "tone"]
+    )]
+    deep: bool,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -57,6 +66,8 @@ Examples:
       veduta render town.obj -o plan.tif --depth 16 --eye 0,0,100 --parallel 120
   Linear light for compositing, in tiles of half floats:
       veduta render town.obj -o town.exr --depth half --tile 64
+  All that is seen in each pixel, with depths and ids, for deep compositing:
+      veduta render town.obj -o deep.exr --deep --depth half
   What is seen, kept for any number of pictures:
       veduta render town.obj -o kept.veduta
   Onto a photograph, through a pipe:
@@ -105,6 +116,7 @@ impl Render {
             return self.run_to_map(place, force, json, talk);
         }
         let target = self.output.target(json)?;
+        let deep_target = self.deep_target(&target)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
@@ -113,6 +125,9 @@ impl Render {
         }
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
+        if let Some(target) = deep_target {
+            return self.render_deep(&target, &scene, &camera, size, json, talk);
+        }
         let development = self.look.development(&scene, self.strict, talk)?;
 
         let screen = self.output.preview.and_then(Screen::of);
@@ -138,18 +153,7 @@ impl Render {
         let Rendered {
             mut picture,
             shortcomings,
-        } = pipeline::render(&scene, &camera, &settings, |step| match step {
-            Step::Projecting => talk.begin("projecting"),
-            Step::FindingVisibility => talk.begin("finding visibility"),
-            Step::Shading => talk.begin("shading"),
-            Step::Strip { index, count } => {
-                if index == 0 {
-                    talk.begin("rendering strip by strip");
-                }
-                talk.part(index, count);
-            }
-            _ => {}
-        });
+        } = pipeline::render(&scene, &camera, &settings, |step| tell_step(step, talk));
         tell_shortcomings(&self.model, &scene, &shortcomings, self.strict, talk)?;
         talk.begin("developing");
         // Before it is developed, since pictures are scaled in linear light.
@@ -187,6 +191,59 @@ impl Render {
         Ok(())
     }
 
+    /// Where the deep picture goes, if one is asked for.
+    fn deep_target<'a>(
+        &self,
+        target: &'a Option<Target>,
+    ) -> Result<Option<DeepTarget<'a>>, Failure> {
+        match target {
+            Some(target) if self.deep => {
+                if self.sampling != Sampling::Exact {
+                    let message = "--deep needs exact areas; leave --sampling out";
+                    return Err(Failure::new(Code::Usage, message));
+                }
+                self.output.deep_target(target).map(Some)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Makes a deep picture, and writes it as it is made.
+    fn render_deep(
+        &self,
+        target: &DeepTarget,
+        scene: &Scene,
+        camera: &Camera,
+        size: Size,
+        json: bool,
+        talk: &mut Talk,
+    ) -> Result<(), Failure> {
+        let settings = RenderSettings {
+            width: size.width,
+            height: size.height,
+            sampling: self.sampling,
+            unlit: self.look.unlit,
+        };
+        let (samples, shortcomings) = target.write(scene, camera, &settings, talk)?;
+        talk.end();
+        tell_shortcomings(&self.model, scene, &shortcomings, self.strict, talk)?;
+        talk.detail(format_args!(
+            "{} faces, {samples} samples",
+            scene.face_count()
+        ));
+        if json {
+            let told = serde_json::json!({
+                "output": target.name(),
+                "size": [size.width, size.height],
+                "faces": scene.face_count(),
+                "samples": samples,
+                "warnings": talk.warnings(),
+            });
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
     /// Stores what is seen instead of showing it.
     fn run_to_map(
         &self,
@@ -196,8 +253,9 @@ impl Render {
         talk: &mut Talk,
     ) -> Result<(), Failure> {
         refuse_place(place, force)?;
-        if self.output.preview.is_some() || self.sampling != Sampling::Exact {
-            let message = "a map is of no picture: --preview and --sampling are not for .veduta";
+        if self.output.preview.is_some() || self.sampling != Sampling::Exact || self.deep {
+            let message =
+                "a map is of no picture: --preview, --sampling and --deep are not for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
         let source = source_of(&self.model)?;
@@ -244,6 +302,22 @@ impl Render {
         }
         scene.keep_layers(|layer| self.layer.contains(&layer.name));
         Ok(())
+    }
+}
+
+/// Tells what the pipeline is about to do.
+pub(super) fn tell_step(step: Step, talk: &mut Talk) {
+    match step {
+        Step::Projecting => talk.begin("projecting"),
+        Step::FindingVisibility => talk.begin("finding visibility"),
+        Step::Shading => talk.begin("shading"),
+        Step::Strip { index, count } => {
+            if index == 0 {
+                talk.begin("rendering strip by strip");
+            }
+            talk.part(index, count);
+        }
+        _ => {}
     }
 }
 

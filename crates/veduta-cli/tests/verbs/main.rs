@@ -1,6 +1,7 @@
 //! The verbs, pictures and pipes as users meet them.
 
 mod check;
+mod deep;
 mod diff;
 mod endings;
 mod examples;

@@ -1,12 +1,18 @@
 use super::decoded::{Channels, Decoded, Samples};
 use super::{PictureProblem, check_size};
+use crate::deep_exr::{self, DeepFile, DeepProblem};
 use exr::error::Error;
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers};
 use std::io::Cursor;
 
-/// Reads the first layer that has R, G and B, with A if it has it.
-pub fn read(bytes: &[u8]) -> Result<Decoded, PictureProblem> {
+/// Reads the first layer that has R, G and B, with A if it has it; of a deep file the first deep part,
+/// made flat.
+pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
+    if deep_exr::is_deep(&bytes) {
+        return read_deep(bytes);
+    }
+    let bytes = &bytes[..];
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(problem)?;
     for header in &meta.headers {
         let size = header.layer_size;
@@ -39,7 +45,37 @@ pub fn read(bytes: &[u8]) -> Result<Decoded, PictureProblem> {
     })
 }
 
-fn problem(error: Error) -> PictureProblem {
+fn read_deep(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
+    let input = bytes.len();
+    let file = DeepFile::from_bytes(bytes)?;
+    let window = file.headers().next().map(|header| header.data_window);
+    let window = window.expect("there is at least one deep part");
+    let (width, height) = check_size(window.width(), window.height(), input)?;
+    let (picture, has_color) = file.flatten(0)?;
+    let mut warnings = Vec::new();
+    if !has_color {
+        warnings.push("it has no colours, so that it is black where it is not clear".to_owned());
+    }
+    Ok(Decoded {
+        width,
+        height,
+        channels: Channels::ColorOpacity,
+        samples: Samples::F32(picture.pixels.into_flattened()),
+        premultiplied: true,
+        warnings,
+    })
+}
+
+impl From<DeepProblem> for PictureProblem {
+    fn from(problem: DeepProblem) -> Self {
+        match problem {
+            DeepProblem::Unreadable(error) => Self::Unreadable(error),
+            problem => Self::Deep(problem),
+        }
+    }
+}
+
+pub fn problem(error: Error) -> PictureProblem {
     match error {
         Error::NotSupported(message) => PictureProblem::Unsupported(message.into_owned()),
         other => PictureProblem::Damaged(other.to_string().replace('\n', " ")),

@@ -15,6 +15,9 @@ mod raster;
 #[cfg(feature = "tiff")]
 mod tiff;
 
+#[cfg(feature = "exr")]
+pub(crate) use exr::problem as exr_problem;
+
 use crate::PictureFormat;
 use crate::write::known_suffixes;
 use std::path::{Path, PathBuf};
@@ -57,6 +60,14 @@ pub enum PictureProblem {
     /// A kind of the format that is not read.
     #[error("is of a kind that is not read: {0}; convert it to .png or .exr")]
     Unsupported(String),
+    /// What is wrong with a deep OpenEXR.
+    #[cfg(feature = "exr")]
+    #[error("{0}")]
+    Deep(crate::deep_exr::DeepProblem),
+    /// A picture that is read with its depths has none that can be used.
+    #[cfg(feature = "exr")]
+    #[error("{0}")]
+    Depth(crate::depth_picture::DepthProblem),
     /// More pixels than a file of that length can honestly hold, or than fit in memory.
     #[error(
         "says that it has {width} x {height} pixels, too many for {input} bytes; it is damaged"
@@ -91,7 +102,7 @@ pub fn read_picture(path: &Path) -> Result<LoadedPicture, ReadPictureError> {
             #[cfg(feature = "tiff")]
             PictureFormat::Tiff => tiff::read(&bytes),
             #[cfg(feature = "exr")]
-            PictureFormat::Exr => exr::read(&bytes),
+            PictureFormat::Exr => exr::read(bytes),
             PictureFormat::Pfm => pfm::read(&bytes),
             PictureFormat::Npy => npy::read(&bytes),
         };
@@ -114,7 +125,11 @@ const PIXELS_PER_BYTE: u64 = 1024;
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// Checks the size that a file of `input` bytes tells, before anything of that size is made.
-fn check_size(width: u64, height: u64, input: usize) -> Result<(u32, u32), PictureProblem> {
+pub(crate) fn check_size(
+    width: u64,
+    height: u64,
+    input: usize,
+) -> Result<(u32, u32), PictureProblem> {
     if width == 0 || height == 0 {
         return Err(PictureProblem::Damaged(format!(
             "it has {width} x {height} pixels"

@@ -337,7 +337,7 @@ pub fn stream_picture(
 }
 
 /// Whether something stands at `path` that is written to rather than replaced.
-fn is_stream(path: &Path) -> bool {
+pub(crate) fn is_stream(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 

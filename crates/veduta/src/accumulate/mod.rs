@@ -2,6 +2,12 @@
 //!
 //! The box filter: a pixel is the sum over its parts of area times radiance. It is exact wherever
 //! radiance is constant over a part.
+//!
+//! [`DeepFilter`] keeps of each face in a pixel a sample of its own, with its depth.
+
+mod deep;
+
+pub use deep::{DeepFilter, DeepRows, DeepSample};
 
 use crate::dice::Parts;
 use crate::shade::Radiance;

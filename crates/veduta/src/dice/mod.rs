@@ -12,16 +12,19 @@
 //! 2. [`dice`] walks the fragments of a band in order, so that the parts of a pixel always come in
 //!    the order of fragments and sums over them are the same in every run.
 //!
-//! [`dice_spans`] does the same for what multiscan found. [`coverage`] gives the areas in f64, for measuring.
+//! [`dice_spans`] does the same for what multiscan found. [`coverage`] gives the areas in f64, for measuring;
+//! [`Depths`] how deep parts reach, for deep pictures.
 
 mod bands;
 mod coverage;
+mod depth;
 mod pixel_grid;
 mod place;
 mod spans;
 
 pub use bands::{BAND_ROWS, Bands};
 pub use coverage::{Coverage, coverage};
+pub use depth::{DepthRange, Depths, depth_of_nearness};
 pub use pixel_grid::PixelGrid;
 pub use spans::{SpanDicer, dice_spans};
 
