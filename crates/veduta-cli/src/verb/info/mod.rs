@@ -1,5 +1,6 @@
 //! `veduta info`: what a model or a picture holds, and what a camera sees at a point of a picture.
 
+mod lights;
 mod model;
 mod pick;
 mod tree;
