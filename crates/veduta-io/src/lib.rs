@@ -44,3 +44,5 @@ pub use write::{
     WriteError, WriteProblem, remove_unfinished, stream_picture, write_model, write_picture,
     write_picture_as,
 };
+#[cfg(feature = "exr")]
+pub use write::{Layers, stream_layers, write_layers};

@@ -6,10 +6,10 @@ use crate::values::Size;
 use clap::{Args, ValueEnum};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-use veduta::accumulate::Picture;
+use veduta::accumulate::{AovSettings, Picture};
 use veduta_io::{
-    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
-    stream_picture, write_picture_as,
+    ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
+    stream_layers, stream_picture, write_layers, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -34,6 +34,13 @@ pub struct Output {
     /// Store an .exr in tiles of this many pixels a side; in scanlines by default
     #[arg(long, value_name = "SIDE", value_parser = clap::value_parser!(u32).range(1..=65_535), requires = "output")]
     tile: Option<u32>,
+    /// Write further channels into an .exr, separated by commas: what the face that covers most of a
+    /// pixel is, and exact mattes
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "output")]
+    aov: Vec<AovArgument>,
+    /// How many names a Cryptomatte can tell of a pixel, rounded up to an even number; 6 by default
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=i64::from(Output::MOST_RANKS)), requires = "aov")]
+    crypto_ranks: Option<u8>,
     /// Show the picture small in the terminal: as kitty graphics, sixel or half blocks, chosen by
     /// what the terminal says of itself, or as told (also into a pipe)
     #[arg(
@@ -75,6 +82,31 @@ enum CompressionArgument {
     Piz,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum AovArgument {
+    /// Z: metres along the view; 1e10 where nothing is seen
+    Depth,
+    /// N.X, N.Y, N.Z in world space, towards the eye
+    Normal,
+    /// P.X, P.Y, P.Z in world space, in metres
+    Position,
+    /// albedo.R, albedo.G, albedo.B: colours without light, premultiplied
+    Albedo,
+    /// id.object: its place in the list of `veduta info --json`, counted from 1; 0 for none
+    Object,
+    /// id.material: likewise
+    Material,
+    /// id.face: likewise, in its object
+    Face,
+    /// Cryptomatte of the objects' names: exact coverage
+    CryptoObject,
+    /// Cryptomatte of the materials' names
+    CryptoMaterial,
+}
+
+/// Names that a Cryptomatte tells of a pixel unless told; what other programs write.
+const USUAL_RANKS: u8 = 6;
+
 /// `--format`
 fn format(name: &str) -> Result<PictureFormat, String> {
     PictureFormat::of_suffix(name)
@@ -98,6 +130,9 @@ enum Place {
 }
 
 impl Output {
+    /// The most names of a pixel in a Cryptomatte: 99 layers of two.
+    pub const MOST_RANKS: u8 = 198;
+
     /// The place asked for, if one is.
     pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
         let Some(output) = &self.output else {
@@ -135,6 +170,9 @@ impl Output {
         if for_exr && format != PictureFormat::Exr {
             return usage("--compression and --tile are for .exr".into());
         }
+        if !self.aov.is_empty() && format != PictureFormat::Exr {
+            return usage("--aov is for .exr".into());
+        }
         let options = self.options();
         let samples = options.samples_in(format);
         let samples = samples.map_err(|problem| {
@@ -146,6 +184,25 @@ impl Output {
             options,
             linear: samples.are_linear(),
         }))
+    }
+
+    /// The channels asked for beside the light.
+    pub fn aovs(&self) -> AovSettings {
+        let asks_for = |aov| self.aov.contains(&aov);
+        let ranks = self.crypto_ranks.unwrap_or(USUAL_RANKS);
+        let ranks = usize::from(ranks).next_multiple_of(2);
+        let ranks_of = |aov| if asks_for(aov) { ranks } else { 0 };
+        AovSettings {
+            depth: asks_for(AovArgument::Depth),
+            normal: asks_for(AovArgument::Normal),
+            position: asks_for(AovArgument::Position),
+            albedo: asks_for(AovArgument::Albedo),
+            object: asks_for(AovArgument::Object),
+            material: asks_for(AovArgument::Material),
+            face: asks_for(AovArgument::Face),
+            object_ranks: ranks_of(AovArgument::CryptoObject),
+            material_ranks: ranks_of(AovArgument::CryptoMaterial),
+        }
     }
 
     fn options(&self) -> PictureOptions {
@@ -199,11 +256,16 @@ impl Target {
         }
     }
 
-    /// Writes the picture there.
-    pub fn write(&self, picture: &Picture) -> Result<(), Failure> {
+    /// Writes the picture there, with `layers` if it is an .exr.
+    pub fn write(&self, picture: &Picture, layers: Option<&Layers>) -> Result<(), Failure> {
+        let (format, options) = (self.format, &self.options);
         let Place::File(path) = &self.place else {
             let mut stdout = io::stdout().lock();
-            return match stream_picture(&mut stdout, self.format, picture, &self.options) {
+            let streamed = match layers {
+                Some(layers) => stream_layers(&mut stdout, picture, layers, options),
+                None => stream_picture(&mut stdout, format, picture, options),
+            };
+            return match streamed {
                 Ok(()) => Ok(()),
                 // Who reads has read enough: `veduta render … -o - | head`.
                 Err(WriteProblem::Io(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -213,7 +275,10 @@ impl Target {
                 )),
             };
         };
-        Ok(write_picture_as(path, self.format, picture, &self.options)?)
+        Ok(match layers {
+            Some(layers) => write_layers(path, picture, layers, options)?,
+            None => write_picture_as(path, format, picture, options)?,
+        })
     }
 
     /// The name to tell.

@@ -11,7 +11,7 @@ use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Loaded, scaled};
+use veduta_io::{Layers, Loaded, scaled};
 
 /// Make a picture of a model
 ///
@@ -56,6 +56,8 @@ Examples:
       veduta render town.obj -o plan.tif --depth 16 --eye 0,0,100 --parallel 120
   Linear light for compositing, in tiles of half floats:
       veduta render town.obj -o town.exr --depth half --tile 64
+  With depth and mattes of all objects:
+      veduta render town.obj -o town.exr --aov depth,normal,crypto-object
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -128,9 +130,11 @@ impl Render {
             height,
             sampling: self.sampling,
             unlit: self.look.unlit,
+            aovs: self.output.aovs(),
         };
         let Rendered {
             mut picture,
+            aovs,
             shortcomings,
         } = pipeline::render(&scene, &camera, &settings, |step| match step {
             Step::Projecting => talk.begin("projecting"),
@@ -151,8 +155,15 @@ impl Render {
         let mut ev = 0.0;
         if let Some(target) = &target {
             ev = development.develop(&mut picture, !target.linear);
+            let layers = Layers {
+                aovs: &aovs,
+                scene: &scene,
+                camera: &camera,
+            };
+            self.tell_of_mattes(&layers, talk)?;
             talk.begin("writing");
-            target.write(&picture)?;
+            let has_layers = !settings.aovs.is_empty();
+            target.write(&picture, has_layers.then_some(&layers))?;
         }
         if let (Some(screen), Some(preview)) = (screen, &mut preview) {
             match &target {
@@ -198,6 +209,37 @@ impl Render {
             }
         }
         scene.keep_layers(|layer| self.layer.contains(&layer.name));
+        Ok(())
+    }
+
+    /// Warns of mattes that do not tell all; if strict, fails.
+    fn tell_of_mattes(&self, layers: &Layers, talk: &mut Talk) -> Result<(), Failure> {
+        let mut messages = Vec::new();
+        let mattes = [&layers.aovs.object_matte, &layers.aovs.material_matte];
+        let most = mattes.into_iter().flatten().map(|matte| matte.most).max();
+        let ranks = mattes.into_iter().flatten().map(|matte| matte.ranks).max();
+        if let (Some(most), Some(ranks)) = (most, ranks)
+            && most > ranks
+        {
+            let enough = most.min(usize::from(Output::MOST_RANKS));
+            messages.push(format!(
+                "a pixel shows up to {most} names, and the Cryptomatte tells the {ranks} largest; \
+                 --crypto-ranks {enough} tells more"
+            ));
+        }
+        for [a, b] in layers.collisions() {
+            messages.push(format!(
+                "{a:?} and {b:?} have the same id in a Cryptomatte; rename one to tell them apart"
+            ));
+        }
+        for message in messages {
+            let message = format!("{}: {message}", self.model.display());
+            if self.strict {
+                let message = format!("{message} (an error because of --strict)");
+                return Err(Failure::new(Code::Unsupported, message));
+            }
+            talk.warn(message);
+        }
         Ok(())
     }
 

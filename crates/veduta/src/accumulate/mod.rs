@@ -2,6 +2,15 @@
 //!
 //! The box filter: a pixel is the sum over its parts of area times radiance. It is exact wherever
 //! radiance is constant over a part.
+//!
+//! Beside it, what a picture tells of its pixels other than light ([`Aovs`]), of which the areas of
+//! things ([`rank`]) are summed up here.
+
+mod aovs;
+mod matte;
+
+pub use aovs::{AovSettings, Aovs};
+pub use matte::{Matte, Rank, rank};
 
 use crate::dice::Parts;
 use crate::shade::Radiance;

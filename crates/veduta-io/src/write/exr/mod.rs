@@ -1,21 +1,111 @@
+//! OpenEXR: channels of a picture, in one part, in scanlines or tiles.
+
+mod cryptomatte;
+mod header;
+mod layers;
+
+pub use layers::Layers;
+
 use super::{ExrCompression, PictureOptions, Samples, WriteProblem};
-use exr::prelude::{
-    Blocks, Compression, Encoding, Image, LineOrder, SpecificChannels, Text, Vec2, WritableImage,
-    f16,
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::image::write::channels::{ChannelsWriter, WritableChannels};
+use exr::math::RoundingMode;
+use exr::meta::attribute::{
+    ChannelDescription, ChannelList, LevelMode, LineOrder, SampleType, Text,
 };
+use exr::meta::header::{Header, LayerAttributes};
+use exr::prelude::{Blocks, Compression, Encoding, Image, Vec2, WritableImage, f16};
+use header::RecordHead;
 use std::io::{Seek, Write};
 use veduta::accumulate::Picture;
 
-/// Writes linear premultiplied RGBA, as f32 without loss or as f16.
+/// A channel: its name, and its value at each pixel, counted along rows from the top.
+struct Channel<'a> {
+    name: String,
+    values: Values<'a>,
+}
+
+/// How a channel is stored, and what.
+enum Values<'a> {
+    F16(Box<dyn Fn(usize) -> f32 + Sync + 'a>),
+    F32(Box<dyn Fn(usize) -> f32 + Sync + 'a>),
+    U32(Box<dyn Fn(usize) -> u32 + Sync + 'a>),
+}
+
+impl<'a> Channel<'a> {
+    /// A channel that is stored like the picture's light.
+    fn of_light(
+        name: impl Into<String>,
+        samples: Samples,
+        value: impl Fn(usize) -> f32 + Sync + 'a,
+    ) -> Self {
+        let value = Box::new(value);
+        Self {
+            name: name.into(),
+            values: match samples {
+                Samples::F16 => Values::F16(value),
+                _ => Values::F32(value),
+            },
+        }
+    }
+
+    /// A channel that half floats could not hold.
+    fn of_floats(name: impl Into<String>, value: impl Fn(usize) -> f32 + Sync + 'a) -> Self {
+        let (name, values) = (name.into(), Values::F32(Box::new(value)));
+        Self { name, values }
+    }
+
+    /// A channel of whole numbers.
+    fn of_numbers(name: impl Into<String>, value: impl Fn(usize) -> u32 + Sync + 'a) -> Self {
+        let (name, values) = (name.into(), Values::U32(Box::new(value)));
+        Self { name, values }
+    }
+}
+
+/// Writes linear premultiplied RGBA, as f32 without loss or as f16, and the `layers` beside it.
 pub fn write(
     writer: &mut (impl Write + Seek),
     picture: &Picture,
+    layers: Option<&Layers>,
     samples: Samples,
     options: &PictureOptions,
 ) -> Result<(), WriteProblem> {
+    let mut channels: Vec<Channel> = ["R", "G", "B", "A"]
+        .into_iter()
+        .enumerate()
+        .map(|(k, name)| Channel::of_light(name, samples, move |pixel| picture.pixels[pixel][k]))
+        .collect();
+    let mut attributes = LayerAttributes {
+        software_name: Some(Text::from("veduta")),
+        ..LayerAttributes::default()
+    };
+    if let Some(layers) = layers {
+        layers.check(picture)?;
+        layers.add_channels(samples, &mut channels);
+        layers.add_attributes(&mut attributes);
+    }
+    // The order that the format asks for.
+    channels.sort_by(|a, b| a.name.cmp(&b.name));
     let size = Vec2(picture.width as usize, picture.height as usize);
-    let pixel = |at: Vec2<usize>| picture.pixels[at.1 * size.0 + at.0];
-    let encoding = Encoding {
+    let channels = Channels {
+        width: size.0,
+        list: channels,
+    };
+    let mut image = Image::from_encoded_channels(size, encoding(options), channels);
+    image.layer_data.attributes = attributes;
+    let mut recorder = RecordHead::new(writer);
+    image
+        .write()
+        .to_buffered(&mut recorder)
+        .map_err(|error| match error {
+            exr::error::Error::Io(error) => WriteProblem::Io(error),
+            other => WriteProblem::Encode(other.to_string()),
+        })?;
+    Ok(recorder.put_in_order()?)
+}
+
+fn encoding(options: &PictureOptions) -> Encoding {
+    Encoding {
         compression: match options.exr_compression {
             ExrCompression::None => Compression::Uncompressed,
             ExrCompression::Rle => Compression::RLE,
@@ -29,29 +119,56 @@ pub fn write(
         },
         // The same bytes whatever the number of threads.
         line_order: LineOrder::Increasing,
-    };
-    macro_rules! write_channels {
-        ($channels:expr) => {{
-            let mut image = Image::from_encoded_channels(size, encoding, $channels);
-            image.layer_data.attributes.software_name = Some(Text::from("veduta"));
-            image.write().to_buffered(writer)
-        }};
     }
-    let written = if samples == Samples::F16 {
-        write_channels!(SpecificChannels::rgba(|at: Vec2<usize>| {
-            let [r, g, b, alpha] = pixel(at).map(half);
-            (r, g, b, alpha)
-        }))
-    } else {
-        write_channels!(SpecificChannels::rgba(|at: Vec2<usize>| {
-            let [r, g, b, alpha] = pixel(at);
-            (r, g, b, alpha)
-        }))
-    };
-    written.map_err(|error| match error {
-        exr::error::Error::Io(error) => WriteProblem::Io(error),
-        other => WriteProblem::Encode(other.to_string()),
-    })
+}
+
+/// All channels, ascending by name, as the encoder asks for them: line by line.
+struct Channels<'a> {
+    /// Of the picture, in pixels.
+    width: usize,
+    list: Vec<Channel<'a>>,
+}
+
+impl<'a, 'slf> WritableChannels<'slf> for Channels<'a>
+where
+    'a: 'slf,
+{
+    type Writer = &'slf Self;
+
+    fn infer_channel_list(&self) -> ChannelList {
+        let describe = |channel: &Channel| {
+            let sample_type = match channel.values {
+                Values::F16(_) => SampleType::F16,
+                Values::F32(_) => SampleType::F32,
+                Values::U32(_) => SampleType::U32,
+            };
+            ChannelDescription::named(channel.name.as_str(), sample_type)
+        };
+        ChannelList::new(self.list.iter().map(describe).collect())
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_writer(&'slf self, _: &Header) -> &'slf Self {
+        self
+    }
+}
+
+impl ChannelsWriter for &Channels<'_> {
+    fn extract_uncompressed_block(&self, header: &Header, block: BlockIndex) -> Vec<u8> {
+        UncompressedBlock::collect_block_data_from_lines(&header.channels, block, |line| {
+            let at = line.location.position;
+            let first = at.1 * self.width + at.0;
+            let written = match &self.list[line.location.channel].values {
+                Values::F16(value) => line.write_samples(|k| half(value(first + k))),
+                Values::F32(value) => line.write_samples(|k| value(first + k)),
+                Values::U32(value) => line.write_samples(|k| value(first + k)),
+            };
+            written.expect("a line has room for its samples");
+        })
+    }
 }
 
 /// The nearest f16. What is too bright becomes the brightest there is: infinities would spread
