@@ -17,6 +17,7 @@
 ))]
 mod read;
 mod read_picture;
+mod reason;
 mod scale;
 pub mod tone;
 mod write;
@@ -38,6 +39,7 @@ pub use read::{LevelOfDetail, LevelOfDetailError};
 #[cfg(feature = "toml")]
 pub use read::{closest_name, scene_file_schema};
 pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
+pub use reason::reason;
 pub use scale::scaled;
 pub use write::{
     ExrCompression, MODEL_SUFFIXES, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples,

@@ -75,6 +75,17 @@ impl Reading {
 
 /// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.
 fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result<Loaded, Failure> {
+    if path.is_dir() {
+        let message = format!("{}: is a folder; name the model in it", path.display());
+        return Err(Failure::new(Code::InputOutput, message));
+    }
+    if is_picture(path) {
+        let message = format!(
+            "{}: is a picture; a model or a scene file is needed",
+            path.display()
+        );
+        return Err(Failure::new(Code::Unsupported, message));
+    }
     talk.begin("reading");
     let loaded = read_scene(path, &reading.options())?;
     talk.end();

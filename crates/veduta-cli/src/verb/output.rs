@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use veduta::accumulate::{AovSettings, Picture};
 use veduta_io::{
     ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
-    stream_layers, stream_picture, write_layers, write_picture_as,
+    reason, stream_layers, stream_picture, write_layers, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -134,7 +134,9 @@ impl Output {
     pub const MOST_RANKS: u8 = 198;
 
     /// The place asked for, if one is.
-    pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
+    ///
+    /// `input` is the file that the picture is made of.
+    pub fn target(&self, input: &Path, json: bool) -> Result<Option<Target>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);
         };
@@ -156,6 +158,9 @@ impl Output {
             Place::Stdout
         } else {
             refuse_output_nowhere(output)?;
+            let name = input.with_extension("png");
+            let name = name.file_name().unwrap_or("picture.png".as_ref());
+            refuse_folder(output, &name.to_string_lossy())?;
             Place::File(output.clone())
         };
         let format = match (self.format, &place) {
@@ -297,15 +302,28 @@ pub fn refuse_output_nowhere(output: &Path) -> Result<(), Failure> {
         .filter(|folder| !folder.as_os_str().is_empty());
     let found = folder.map_or(Ok(()), |folder| match std::fs::metadata(folder) {
         Ok(metadata) if metadata.is_dir() => Ok(()),
-        Ok(_) => Err("it is not a folder".to_owned()),
-        Err(error) => Err(error.to_string()),
+        Ok(_) => Err(format!("{} is not a folder", folder.display())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(format!(
+            "there is no folder {}; make it first",
+            folder.display()
+        )),
+        Err(error) => Err(format!("{}: {}", folder.display(), reason(&error))),
     });
-    found.map_err(|reason| {
-        let folder = folder.unwrap_or(output).display();
-        let message = format!(
-            "{}: cannot be written into {folder}: {reason}",
-            output.display()
-        );
+    found.map_err(|problem| {
+        let message = format!("{}: {problem}", output.display());
         Failure::new(Code::InputOutput, message)
     })
+}
+
+/// Fails where a folder stands in the place of the file. `name` is that of a file, for the message.
+fn refuse_folder(output: &Path, name: &str) -> Result<(), Failure> {
+    if !output.is_dir() {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: is a folder; name a file in it, such as {}",
+        output.display(),
+        output.join(name).display()
+    );
+    Err(Failure::new(Code::InputOutput, message))
 }

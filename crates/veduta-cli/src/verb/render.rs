@@ -100,7 +100,7 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let target = self.output.target(json)?;
+        let target = self.output.target(&self.model, json)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;

@@ -46,7 +46,7 @@ pub struct ReadPictureError {
 #[non_exhaustive]
 pub enum PictureProblem {
     /// The operating system's word.
-    #[error("cannot be read: {0}")]
+    #[error("cannot be read: {}", crate::reason(.0))]
     Unreadable(#[from] std::io::Error),
     /// The suffix names no format that is read.
     #[error("has no suffix of a picture; pictures are read from {0}")]

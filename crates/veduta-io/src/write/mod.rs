@@ -259,10 +259,10 @@ pub struct WriteError {
 #[non_exhaustive]
 pub enum WriteProblem {
     /// The suffix names no format that is written.
-    #[error("has no suffix of a picture; pictures are written as {0}")]
+    #[error("is of no format that is written; pictures are written as {0}")]
     UnknownSuffix(String),
     /// The suffix names no format of models that is written.
-    #[error("has no suffix of a model; models are written as {0}")]
+    #[error("is of no format that is written; models are written as {0}")]
     UnknownModelSuffix(String),
     /// The format has no such samples.
     #[error("a picture of that format is stored as {possible}, not as {asked}")]
@@ -273,7 +273,7 @@ pub enum WriteProblem {
         possible: String,
     },
     /// The operating system's word.
-    #[error("cannot be written: {0}")]
+    #[error("cannot be written: {}", crate::reason(.0))]
     Io(#[from] io::Error),
     /// The format cannot hold the picture.
     #[error("cannot hold the picture: {0}")]
