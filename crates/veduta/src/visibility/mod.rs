@@ -22,13 +22,4 @@ mod strips;
 pub use project::project;
 pub use strips::{Strip, Strips};
 
-use veduta_map::Fragments;
-
-/// What an engine finds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Seen {
-    /// Where opaque faces are seen; these do not overlap.
-    pub opaque: Fragments,
-    /// Where veils are seen: cut by the opaque faces in front of them, not by one another.
-    pub veils: Fragments,
-}
+pub use veduta_map::Seen;
