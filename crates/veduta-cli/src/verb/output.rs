@@ -34,8 +34,12 @@ pub struct Output {
     /// Store an .exr in tiles of this many pixels a side; in scanlines by default
     #[arg(long, value_name = "SIDE", value_parser = clap::value_parser!(u32).range(1..=65_535), requires = "output")]
     tile: Option<u32>,
-    /// Write further channels into an .exr, separated by commas: what the face that covers most of a
-    /// pixel is, and exact mattes
+    /// Write further channels into an .exr, separated by commas
+    ///
+    /// Depth, normal, position and numbers are those of the face that covers most of the pixel, at the
+    /// centroid of what is seen of it, and not filtered; albedo and Cryptomatte are exact areas. Where
+    /// nothing is seen, depth is 1e10 and all else 0. The camera is told by worldToCamera and
+    /// worldToNDC.
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "output")]
     aov: Vec<AovArgument>,
     /// How many names a Cryptomatte can tell of a pixel, rounded up to an even number; 6 by default
@@ -84,7 +88,7 @@ enum CompressionArgument {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum AovArgument {
-    /// Z: metres along the view; 1e10 where nothing is seen
+    /// Z: metres along the line of sight's axis, larger is farther
     Depth,
     /// N.X, N.Y, N.Z in world space, towards the eye
     Normal,

@@ -6,7 +6,9 @@ use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
 use crate::values::{self, FieldOfView, Size};
 use clap::Args;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use veduta::accumulate::Aovs;
 use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
@@ -108,7 +110,7 @@ impl Render {
             target.refuse_size(size)?;
         }
         let mut scene = loaded.scene;
-        self.keep_layers(&mut scene)?;
+        let rows_before = self.keep_layers(&mut scene)?;
         let development = self.look.development(&scene, self.strict, talk)?;
 
         let screen = self.output.preview.and_then(Screen::of);
@@ -134,7 +136,7 @@ impl Render {
         };
         let Rendered {
             mut picture,
-            aovs,
+            mut aovs,
             shortcomings,
         } = pipeline::render(&scene, &camera, &settings, |step| match step {
             Step::Projecting => talk.begin("projecting"),
@@ -149,6 +151,12 @@ impl Render {
             _ => {}
         });
         self.tell_shortcomings(&scene, &shortcomings, talk)?;
+        // So that pictures of layers give an object the same number.
+        for object in aovs.object.iter_mut().flatten() {
+            if *object != Aovs::NOTHING {
+                *object = rows_before[*object as usize];
+            }
+        }
         talk.begin("developing");
         // Before it is developed, since pictures are scaled in linear light.
         let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
@@ -192,10 +200,10 @@ impl Render {
         Ok(())
     }
 
-    /// Leaves out all layers but those asked for.
-    fn keep_layers(&self, scene: &mut Scene) -> Result<(), Failure> {
+    /// Leaves out all layers but those asked for. Tells of each object that stays its row before.
+    fn keep_layers(&self, scene: &mut Scene) -> Result<Vec<u32>, Failure> {
         if self.layer.is_empty() {
-            return Ok(());
+            return Ok((0..scene.objects.len() as u32).collect());
         }
         let names = scene.layers.iter().map(|layer| layer.name.as_str());
         for name in &self.layer {
@@ -208,8 +216,14 @@ impl Render {
                 return Err(Failure::new(Code::Missing, message));
             }
         }
+        let objects = scene.objects.iter().map(|object| object.name.clone());
+        let rows: HashMap<String, u32> = objects.zip(0..).collect();
         scene.keep_layers(|layer| self.layer.contains(&layer.name));
-        Ok(())
+        Ok(scene
+            .objects
+            .iter()
+            .map(|object| rows[&object.name])
+            .collect())
     }
 
     /// Warns of mattes that do not tell all; if strict, fails.

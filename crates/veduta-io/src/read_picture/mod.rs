@@ -27,6 +27,9 @@ pub struct LoadedPicture {
     pub picture: Picture,
     /// Whether the file holds light as it is (floating point), rather than sRGB for a display.
     pub linear: bool,
+    /// Names of the channels that the file has beside the picture's own, ascending: those of an EXR,
+    /// which stay unread.
+    pub further_channels: Vec<String>,
     /// What a user should know; sentences without the file's name.
     pub warnings: Vec<String>,
 }

@@ -8,8 +8,8 @@ use super::{Matte, Rank};
 /// mean of two depths is the depth of neither. The point is the centroid of what is seen of
 /// that face in the pixel, so that it always lies on it. Albedo and mattes are exact areas.
 ///
-/// Nothing but the picture's opacity tells which pixels show nothing: there depth is
-/// [`Aovs::FARTHEST`], the numbers are [`Aovs::NOTHING`], and all else is 0.
+/// In pixels that show nothing depth is [`Aovs::FARTHEST`], the numbers are [`Aovs::NOTHING`], and all
+/// else is 0, as the picture's opacity is there.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Aovs {
     /// Depth in metres along the line of sight's axis (not along the ray), larger is farther.

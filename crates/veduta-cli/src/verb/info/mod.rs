@@ -135,6 +135,7 @@ fn picture_told(loaded: &LoadedPicture) -> (Value, String) {
     let json = json!({
         "size": [picture.width, picture.height],
         "stored": stored,
+        "furtherChannels": loaded.further_channels,
         "min": (finite > 0.0).then_some(low),
         "max": (finite > 0.0).then_some(high),
         "mean": (finite > 0.0).then_some(mean),
@@ -144,6 +145,14 @@ fn picture_told(loaded: &LoadedPicture) -> (Value, String) {
         "  size      {} x {} pixels\n  stored    {stored}\n",
         picture.width, picture.height
     );
+    if !loaded.further_channels.is_empty() {
+        let names: Vec<_> = loaded
+            .further_channels
+            .iter()
+            .map(|name| plain(name))
+            .collect();
+        text += &format!("  beside    {}\n", names.join(", "));
+    }
     if finite > 0.0 {
         text += "  linear light, premultiplied     min         mean          max\n";
         for (k, name) in ["red", "green", "blue", "opacity"].into_iter().enumerate() {
