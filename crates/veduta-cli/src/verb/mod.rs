@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod completions;
+pub mod composite;
 pub mod diff;
 pub mod examples;
 pub mod info;
@@ -10,13 +11,18 @@ pub mod man;
 mod output;
 pub mod render;
 pub mod schema;
+pub mod shade;
+mod stored;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use clap::{Args, ValueEnum};
+use output::Output;
 use std::path::Path;
+use veduta::pipeline::Shortcoming;
+use veduta::scene::Scene;
 use veduta_io::{
-    LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
+    Layers, LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
 };
 
 /// `--up-axis`
@@ -97,6 +103,71 @@ fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result
         talk.warn(warning.to_string());
     }
     Ok(loaded)
+}
+
+/// Warns of what a picture of `file` will not show as it should; if strict, fails.
+fn tell_shortcomings(
+    file: &Path,
+    scene: &Scene,
+    shortcomings: &[Shortcoming],
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    let file = file.display();
+    for shortcoming in shortcomings {
+        let message = match shortcoming {
+            Shortcoming::DrawnOpaque(material) => {
+                let name = &scene.material(*material).name;
+                format!("{file}: the material {name:?} is not opaque, but drawn so")
+            }
+            Shortcoming::VeilsLeftOut(count) => {
+                format!("{file}: {count} pieces of surfaces that are not opaque are left out")
+            }
+            other => format!("{file}: not shown as it should be: {other:?}"),
+        };
+        if strict {
+            let message = format!("{message} (an error because of --strict)");
+            return Err(Failure::new(Code::Unsupported, message));
+        }
+        talk.warn(message);
+    }
+    Ok(())
+}
+
+/// Warns of mattes that do not tell all of the picture of `file`; if strict, fails.
+fn tell_of_mattes(
+    file: &Path,
+    layers: &Layers,
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    let mut messages = Vec::new();
+    let mattes = [&layers.aovs.object_matte, &layers.aovs.material_matte];
+    let mattes = mattes.into_iter().flatten();
+    if let Some(matte) = mattes.max_by_key(|matte| matte.most)
+        && matte.most > matte.ranks
+    {
+        let enough = matte.most.min(usize::from(Output::MOST_RANKS));
+        messages.push(format!(
+            "a pixel shows up to {} names, and the Cryptomatte tells the {} largest; \
+             --crypto-ranks {enough} tells more",
+            matte.most, matte.ranks
+        ));
+    }
+    for [a, b] in layers.collisions() {
+        messages.push(format!(
+            "{a:?} and {b:?} have the same id in a Cryptomatte; rename one to tell them apart"
+        ));
+    }
+    for message in messages {
+        let message = format!("{}: {message}", file.display());
+        if strict {
+            let message = format!("{message} (an error because of --strict)");
+            return Err(Failure::new(Code::Unsupported, message));
+        }
+        talk.warn(message);
+    }
+    Ok(())
 }
 
 /// What to say of a name that is not among `known`, which are called `what`.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use veduta::accumulate::{AovSettings, Picture};
 use veduta_io::{
     ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
-    reason, stream_layers, stream_picture, write_layers, write_picture_as,
+    is_map, reason, stream_layers, stream_picture, write_layers, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -96,7 +96,8 @@ enum AovArgument {
     Position,
     /// albedo.R, albedo.G, albedo.B: colours without light, premultiplied
     Albedo,
-    /// id.object: its place in the list of `veduta info --json`, counted from 1; 0 for none
+    /// id.object: its place in the list that `veduta info --json` tells of the input, counted from 1;
+    /// 0 for none
     Object,
     /// id.material: likewise
     Material,
@@ -137,7 +138,13 @@ impl Output {
     /// The most names of a pixel in a Cryptomatte: 99 layers of two.
     pub const MOST_RANKS: u8 = 198;
 
-    /// The place asked for, if one is.
+    /// The place of a stored map, if one is asked for.
+    pub fn map_place(&self) -> Option<&Path> {
+        let output = self.output.as_deref();
+        output.filter(|output| self.format.is_none() && is_map(output))
+    }
+
+    /// The place of a picture asked for, if one is.
     ///
     /// `input` is the file that the picture is made of.
     pub fn target(&self, input: &Path, json: bool) -> Result<Option<Target>, Failure> {
@@ -179,7 +186,7 @@ impl Output {
         if for_exr && format != PictureFormat::Exr {
             return usage("--compression and --tile are for .exr".into());
         }
-        if !self.aov.is_empty() && format != PictureFormat::Exr {
+        if self.has_layers() && format != PictureFormat::Exr {
             return usage("--aov is for .exr".into());
         }
         let options = self.options();
@@ -193,6 +200,21 @@ impl Output {
             options,
             linear: samples.are_linear(),
         }))
+    }
+
+    /// Whether channels are asked for beside the light.
+    pub fn has_layers(&self) -> bool {
+        !self.aov.is_empty()
+    }
+
+    /// Whether numbers of objects, materials or faces are asked for.
+    pub fn has_numbers(&self) -> bool {
+        let of_scene = [
+            AovArgument::Object,
+            AovArgument::Material,
+            AovArgument::Face,
+        ];
+        self.aov.iter().any(|aov| of_scene.contains(aov))
     }
 
     /// The channels asked for beside the light.

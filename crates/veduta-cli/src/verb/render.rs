@@ -1,6 +1,7 @@
 use super::look::Look;
 use super::output::Output;
-use super::{Reading, load, unknown_name};
+use super::stored::{refuse_place, summary, tell_work};
+use super::{Reading, load, tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
@@ -9,11 +10,12 @@ use clap::Args;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Aovs;
-use veduta::map::{Camera, Projection};
-use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
+use veduta::dice::PixelGrid;
+use veduta::map::{Camera, Projection, SeenScene};
+use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Layers, Loaded, scaled};
+use veduta_io::{Layers, Loaded, scaled, source_of, write_map};
 
 /// Make a picture of a model
 ///
@@ -60,6 +62,8 @@ Examples:
       veduta render town.obj -o town.exr --depth half --tile 64
   With depth and mattes of all objects:
       veduta render town.obj -o town.exr --aov depth,normal,crypto-object
+  What is seen, kept for any number of pictures:
+      veduta render town.obj -o kept.veduta
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -101,7 +105,10 @@ impl Render {
     /// Width and height in pixels where none are given.
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
-    pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+    pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if let Some(place) = self.output.map_place() {
+            return self.run_to_map(place, force, json, talk);
+        }
         let target = self.output.target(&self.model, json)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
@@ -150,7 +157,7 @@ impl Render {
             }
             _ => {}
         });
-        self.tell_shortcomings(&scene, &shortcomings, talk)?;
+        tell_shortcomings(&self.model, &scene, &shortcomings, self.strict, talk)?;
         // So that pictures of layers give an object the same number.
         for object in aovs.object.iter_mut().flatten() {
             if *object != Aovs::NOTHING {
@@ -167,11 +174,11 @@ impl Render {
                 aovs: &aovs,
                 scene: &scene,
                 camera: &camera,
+                grid: PixelGrid::of_frame(width, height),
             };
-            self.tell_of_mattes(&layers, talk)?;
+            tell_of_mattes(&self.model, &layers, self.strict, talk)?;
             talk.begin("writing");
-            let has_layers = !settings.aovs.is_empty();
-            target.write(&picture, has_layers.then_some(&layers))?;
+            target.write(&picture, self.output.has_layers().then_some(&layers))?;
         }
         if let (Some(screen), Some(preview)) = (screen, &mut preview) {
             match &target {
@@ -195,6 +202,47 @@ impl Render {
                 "exposure": ev,
                 "warnings": talk.warnings(),
             });
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// Stores what is seen instead of showing it.
+    fn run_to_map(
+        &self,
+        place: &Path,
+        force: bool,
+        json: bool,
+        talk: &mut Talk,
+    ) -> Result<(), Failure> {
+        refuse_place(place, force)?;
+        let of_pictures = self.output.preview.is_some() || self.output.has_layers();
+        if of_pictures || self.sampling != Sampling::Exact {
+            let message =
+                "a map is of no picture: --preview, --aov and --sampling are not for .veduta";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let source = source_of(&self.model)?;
+        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
+        talk.begin("finding visibility");
+        let map = pipeline::find_visibility(&scene, &camera);
+        let seen = SeenScene::of(&scene, &map, [size.width, size.height]);
+        talk.begin("writing");
+        write_map(place, &seen, &[source])?;
+        talk.end();
+        talk.detail(format_args!("{}", summary(&seen)));
+        if json {
+            let mut told = serde_json::json!({
+                "output": place.to_string_lossy(),
+                "size": seen.size,
+                "faces": scene.face_count(),
+                "facesSeen": seen.map.faces.len(),
+                "warnings": talk.warnings(),
+            });
+            tell_work(&mut told);
             print(&format!("{told}\n"))?;
         }
         Ok(())
@@ -224,65 +272,6 @@ impl Render {
             .iter()
             .map(|object| rows[&object.name])
             .collect())
-    }
-
-    /// Warns of mattes that do not tell all; if strict, fails.
-    fn tell_of_mattes(&self, layers: &Layers, talk: &mut Talk) -> Result<(), Failure> {
-        let mut messages = Vec::new();
-        let mattes = [&layers.aovs.object_matte, &layers.aovs.material_matte];
-        let most = mattes.into_iter().flatten().map(|matte| matte.most).max();
-        let ranks = mattes.into_iter().flatten().map(|matte| matte.ranks).max();
-        if let (Some(most), Some(ranks)) = (most, ranks)
-            && most > ranks
-        {
-            let enough = most.min(usize::from(Output::MOST_RANKS));
-            messages.push(format!(
-                "a pixel shows up to {most} names, and the Cryptomatte tells the {ranks} largest; \
-                 --crypto-ranks {enough} tells more"
-            ));
-        }
-        for [a, b] in layers.collisions() {
-            messages.push(format!(
-                "{a:?} and {b:?} have the same id in a Cryptomatte; rename one to tell them apart"
-            ));
-        }
-        for message in messages {
-            let message = format!("{}: {message}", self.model.display());
-            if self.strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::Unsupported, message));
-            }
-            talk.warn(message);
-        }
-        Ok(())
-    }
-
-    /// Warns of what the picture will not show as it should; if strict, fails.
-    fn tell_shortcomings(
-        &self,
-        scene: &Scene,
-        shortcomings: &[Shortcoming],
-        talk: &mut Talk,
-    ) -> Result<(), Failure> {
-        let model = self.model.display();
-        for shortcoming in shortcomings {
-            let message = match shortcoming {
-                Shortcoming::DrawnOpaque(material) => {
-                    let name = &scene.material(*material).name;
-                    format!("{model}: the material {name:?} is not opaque, but drawn so")
-                }
-                Shortcoming::VeilsLeftOut(count) => {
-                    format!("{model}: {count} pieces of surfaces that are not opaque are left out")
-                }
-                other => format!("{model}: not shown as it should be: {other:?}"),
-            };
-            if self.strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::Unsupported, message));
-            }
-            talk.warn(message);
-        }
-        Ok(())
     }
 }
 

@@ -28,9 +28,9 @@ mod webp;
 #[cfg(feature = "exr")]
 pub use self::exr::Layers;
 pub use model::{MODEL_SUFFIXES, write_model};
+pub(crate) use partial_file::PartialFile;
 pub use partial_file::remove_unfinished;
 
-use partial_file::PartialFile;
 use std::fmt;
 use std::io::{self, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};

@@ -109,6 +109,7 @@ impl Made {
             aovs: &self.aovs,
             scene: &self.scene,
             camera: &self.map.camera,
+            grid: PixelGrid::of_frame(SIZE.0, SIZE.1),
         }
     }
 

@@ -5,6 +5,8 @@ use crate::Camera;
 use crate::scene::{Layer, Light, Material, World};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::io::{self, Read};
+use xxhash_rust::xxh3::Xxh3;
 
 /// Name of the member.
 pub const MANIFEST: &str = "manifest.json";
@@ -47,6 +49,31 @@ pub struct Source {
     pub length: u64,
     /// XXH3 of the bytes, 128 bits, hexadecimal.
     pub xxh3: String,
+}
+
+impl Source {
+    /// What is to be said of a file with these contents.
+    ///
+    /// # Errors
+    /// Those of `contents`.
+    pub fn of(path: &str, mut contents: impl Read) -> io::Result<Self> {
+        let mut checksum = Xxh3::new();
+        let mut length = 0;
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            let read = contents.read(&mut buffer)?;
+            if read == 0 {
+                break;
+            }
+            checksum.update(&buffer[..read]);
+            length += read as u64;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            length,
+            xxh3: format!("{:032x}", checksum.digest128()),
+        })
+    }
 }
 
 /// Where the batches of a table lie, and their checksums. A table's bytes are its head (Arrow's schema),

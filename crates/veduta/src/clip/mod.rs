@@ -23,10 +23,14 @@ use crate::buckets::Buckets;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use veduta_map::FaceId;
 
 /// Faces that a task clips at a time.
 pub(crate) const FACES_PER_TASK: usize = 256;
+
+/// Faces clipped since the process began.
+pub(crate) static CLIPPED: AtomicU64 = AtomicU64::new(0);
 
 /// Lets `clip` clip each of `faces` and store what is left of it, side by side. It is given a clipper and
 /// what else a task keeps.
@@ -35,6 +39,7 @@ pub(crate) fn clip_each<T: Default + Send>(
     faces: &[FaceId],
     clip: impl Fn(&mut Clipper, &mut T, FaceId, &mut Pile) + Sync,
 ) -> Vec<Pile> {
+    CLIPPED.fetch_add(faces.len() as u64, Relaxed);
     // A clipper is as large as the scene has faces, so tasks hand theirs on rather than make new ones.
     let idle: Mutex<Vec<(Clipper, T)>> = Mutex::new(Vec::new());
     let lock = || idle.lock().expect("no task fails while it holds the lock");

@@ -23,3 +23,22 @@ pub use project::project;
 pub use strips::{Strip, Strips};
 
 pub use veduta_map::Seen;
+
+use std::sync::atomic::Ordering::Relaxed;
+
+/// How much visibility was found, since the process began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work {
+    /// Faces put into the image plane.
+    pub projected: u64,
+    /// Faces compared with others to find what is seen of them, by the main engine or in compositing.
+    pub clipped: u64,
+}
+
+/// How much visibility this process has found so far: proof that what works on a stored map finds none.
+pub fn work() -> Work {
+    Work {
+        projected: project::PROJECTED.load(Relaxed),
+        clipped: crate::clip::CLIPPED.load(Relaxed),
+    }
+}

@@ -12,11 +12,15 @@
 
 use crate::scene::{FaceIndex, Mesh, Object, PlaneGroups, Scene};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use veduta_geometry::{DVec2, DVec3, DVec4, signed_area};
 use veduta_map::{Camera, Faces, ObjectId, Projection};
 
 /// Faces a task projects at a time: enough to hide the cost of a task, few enough to share evenly.
 const FACES_PER_TASK: usize = 16 * 1024;
+
+/// Faces projected since the process began; see [`work`](super::work).
+pub(super) static PROJECTED: AtomicU64 = AtomicU64::new(0);
 
 /// The faces of `scene` that may be seen through `camera`, clipped to the view pyramid.
 ///
@@ -46,6 +50,7 @@ pub fn project(scene: &Scene, camera: &Camera) -> Faces {
         }
     }
     groups.share_planes(&mut faces);
+    PROJECTED.fetch_add(faces.len() as u64, Relaxed);
     faces
 }
 

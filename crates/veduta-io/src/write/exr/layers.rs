@@ -3,8 +3,10 @@ use super::{Channel, WriteProblem};
 use crate::Samples;
 use exr::meta::header::LayerAttributes;
 use veduta::accumulate::{Aovs, Picture};
+use veduta::dice::PixelGrid;
 use veduta::map::{Camera, Projection};
 use veduta::scene::Scene;
+use veduta_geometry::{DMat4, DVec2, DVec3, DVec4};
 
 /// What an EXR tells of its pixels beside R, G, B and A, and of the camera that saw them.
 ///
@@ -29,6 +31,8 @@ pub struct Layers<'a> {
     pub scene: &'a Scene,
     /// Who saw it.
     pub camera: &'a Camera,
+    /// Where the picture's pixels lie in the camera's frame.
+    pub grid: PixelGrid,
 }
 
 impl<'a> Layers<'a> {
@@ -134,7 +138,7 @@ impl<'a> Layers<'a> {
         for cryptomatte in self.cryptomattes() {
             cryptomatte.add_attributes(attributes);
         }
-        let [world_to_camera, world_to_ndc] = matrices(self.camera);
+        let [world_to_camera, world_to_ndc] = matrices(self.camera, &self.grid);
         attributes.world_to_camera = Some(world_to_camera);
         attributes.world_to_normalized_device = Some(world_to_ndc);
     }
@@ -174,11 +178,12 @@ fn told(name: &str) -> &str {
 
 /// `worldToCamera` and `worldToNDC`. Our matrices stand to the left of vectors and are stored column by
 /// column, which is the same numbers.
-fn matrices(camera: &Camera) -> [[f32; 16]; 2] {
-    use veduta_geometry::{DMat4, DVec3, DVec4};
+fn matrices(camera: &Camera, grid: &PixelGrid) -> [[f32; 16]; 2] {
     let turn = DMat4::from_scale(DVec3::new(1.0, -1.0, 1.0));
     let world_to_camera = turn * camera.eye_from_world;
-    let (scale, ahead) = (camera.image_scale(), camera.principal_point());
+    let size = DVec2::new(grid.width.into(), grid.height.into());
+    let scale = camera.image_scale() * grid.pixels_per_frame / size;
+    let ahead = grid.pixels_from_image(camera.principal_point()) / size;
     let x = DVec4::new(scale.x, 0.0, 0.0, 0.0);
     let y = DVec4::new(0.0, scale.y, 0.0, 0.0);
     let (z, w) = match camera.projection {
@@ -198,7 +203,6 @@ fn matrices(camera: &Camera) -> [[f32; 16]; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use veduta_geometry::{DVec2, DVec3};
 
     #[test]
     fn points_get_to_their_place_in_the_picture_by_the_matrix() {
@@ -216,7 +220,9 @@ mod tests {
             let camera = Camera::looking(eye, DVec3::ZERO, DVec3::Z, projection, 0.25);
             let mut camera = camera.expect("a sound camera");
             camera.shift = DVec2::new(0.1, -0.2);
-            let [to_camera, to_ndc] = matrices(&camera);
+            // A window of a larger picture.
+            let grid = PixelGrid::of_frame(60, 40).window(10.0, -5.0, 32, 24);
+            let [to_camera, to_ndc] = matrices(&camera, &grid);
             // A row vector times a matrix whose rows are stored one after the other.
             let times = |point: DVec3, matrix: [f32; 16]| -> [f64; 4] {
                 let row = [point.x, point.y, point.z, 1.0];
@@ -232,8 +238,9 @@ mod tests {
                 let expected = DVec3::new(in_eye.x, -in_eye.y, in_eye.z);
                 assert!((DVec3::new(x, y, z) - expected).length() < 1e-5 && w == 1.0);
                 let [x, y, z, w] = times(point, to_ndc);
-                let image = camera.image_from_eye(in_eye);
-                assert!((DVec2::new(x, y) / w - image).length() < 1e-5, "{point}");
+                let pixels = grid.pixels_from_image(camera.image_from_eye(in_eye));
+                let expected = pixels / DVec2::new(32.0, 24.0);
+                assert!((DVec2::new(x, y) / w - expected).length() < 1e-5, "{point}");
                 assert!((z - (in_eye.z - camera.near)).abs() < 1e-5);
             }
         }
