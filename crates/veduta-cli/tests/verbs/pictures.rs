@@ -229,3 +229,41 @@ fn a_cryptomatte_with_too_few_ranks_is_told() {
         .assert()
         .code(5);
 }
+
+#[test]
+fn a_stored_map_has_the_same_channels() {
+    let folder = Folder::new();
+    let layers = "--aov depth,object,crypto-object";
+    folder.told(&format!("render town.obj {FACING} -o kept.veduta"));
+    folder.told(&format!("shade kept.veduta {layers} -o shaded.exr"));
+    folder.told(&format!(
+        "render town.obj {FACING} {layers} -o rendered.exr"
+    ));
+    let [shaded, rendered] = ["shaded", "rendered"]
+        .map(|name| folder.json(&format!("info {name}.exr"))["furtherChannels"].clone());
+    assert_eq!(shaded, rendered);
+    assert_eq!(
+        difference(&folder, "shaded.exr", "rendered.exr", "")["differing"],
+        0
+    );
+    folder.told(&format!("composite kept.veduta {layers} -o composite.exr"));
+    for (arguments, message) in [
+        (
+            "render town.obj -o a.veduta --aov depth",
+            "--aov and --sampling are not for .veduta",
+        ),
+        (
+            "composite kept.veduta -o a.veduta --aov depth",
+            "--aov is not for .veduta",
+        ),
+        (
+            "shade kept.veduta -o a.exr --aov face --window 0,0,2,2",
+            "leave --window out, or ask for --aov crypto-object",
+        ),
+    ] {
+        let refused = folder.veduta(arguments).assert().code(2);
+        let stderr = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(stderr.contains(message), "{arguments}: {stderr}");
+    }
+    folder.told("shade kept.veduta -o a.exr --aov crypto-object --window 0,0,2,2");
+}
