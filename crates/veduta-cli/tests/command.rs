@@ -204,7 +204,8 @@ const FAILURES: &[(&str, i32, &str)] = &[
     (
         "render square.obj -o a.png --background red",
         2,
-        "expected none, a colour such as #8ab4d8, or a picture such as sky.jpg",
+        "expected none, a colour such as '#8ab4d8' (in quotes, since shells take # for a comment), or a \
+            picture such as sky.jpg",
     ),
     (
         "render square.obj -o a.png --exposure bright",
