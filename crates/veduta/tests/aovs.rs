@@ -21,8 +21,11 @@ const ALL: AovSettings = AovSettings {
     material_ranks: 64,
 };
 
-/// Squares of `corners` with a colour each, one object each.
-fn squares(squares: &[(&str, [[f64; 3]; 4], [f32; 3])]) -> Scene {
+/// A name, corners, and a colour.
+type Square = (&'static str, [[f64; 3]; 4], [f32; 3]);
+
+/// An object of each square.
+fn squares(squares: &[Square]) -> Scene {
     let mut scene = Scene::default();
     for (row, &(name, corners, [r, g, b])) in squares.iter().enumerate() {
         let mut mesh = Mesh {

@@ -306,10 +306,11 @@ impl Target {
                 )),
             };
         };
-        Ok(match layers {
-            Some(layers) => write_layers(path, picture, layers, options)?,
-            None => write_picture_as(path, format, picture, options)?,
-        })
+        let written = match layers {
+            Some(layers) => write_layers(path, picture, layers, options),
+            None => write_picture_as(path, format, picture, options),
+        };
+        Ok(written?)
     }
 
     /// The name to tell.

@@ -175,7 +175,7 @@ mod tests {
             assert_eq!(murmur3_32(name.as_bytes()), hash, "{name}");
         }
         for (name, id) in [
-            ("hello", 6.070_562_7e-17),
+            ("hello", 6.070_563e-17),
             ("cube", -4.084_619e15),
             ("sphere", 2.790_186e15),
             ("plane", 3.665_576_2e-11),
