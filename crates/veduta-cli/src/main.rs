@@ -9,12 +9,15 @@ mod talk;
 mod values;
 mod verb;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use exit::{Code, Ending, Failure};
 use std::num::NonZeroUsize;
 use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
 use std::process::ExitCode;
 use talk::{ProgressStyle, Talk, say_error};
+use veduta_io::PictureFormat;
 
 /// Pictures of 3D scenes with exactly antialiased edges.
 #[derive(Debug, Parser)]
@@ -99,8 +102,12 @@ fn main() -> ExitCode {
     });
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
+        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            eprint!("{}", error.render());
+            return ExitCode::from(Code::Usage as u8);
+        }
         Err(error) if error.use_stderr() => {
-            eprint!("veduta: {}", error.render());
+            eprint!("veduta: {}", with_tip(error).render());
             return ExitCode::from(Code::Usage as u8);
         }
         // Help or version were asked for.
@@ -113,6 +120,27 @@ fn main() -> ExitCode {
         // The hook has told it already.
         Err(_) => ExitCode::from(Code::Internal as u8),
     }
+}
+
+/// The error, with a tip where a word too many shows what was meant.
+fn with_tip(mut error: clap::Error) -> clap::Error {
+    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidArg) else {
+        return error;
+    };
+    let tip = if error.kind() != ErrorKind::UnknownArgument {
+        None
+    } else if PictureFormat::of(Path::new(word)).is_ok() {
+        Some(format!("the picture to write is named by -o: -o {word}"))
+    } else if word.parse::<f64>().is_ok() {
+        Some("coordinates are one word: 1,2,3".to_owned())
+    } else {
+        None
+    };
+    if let Some(tip) = tip {
+        let tips = ContextValue::StyledStrs(vec![tip.into()]);
+        error.insert(ContextKind::Suggested, tips);
+    }
+    error
 }
 
 fn run(arguments: Arguments) -> Result<Ending, Failure> {

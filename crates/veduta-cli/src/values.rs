@@ -200,8 +200,10 @@ impl FromStr for Background {
         if PictureFormat::of(Path::new(text)).is_ok() {
             return Ok(Self::Picture(PathBuf::from(text)));
         }
-        let expected =
-            || "expected none, a colour such as #8ab4d8, or a picture such as sky.jpg".to_owned();
+        let expected = || {
+            "expected none, a colour such as '#8ab4d8' (in quotes, since shells take # for a comment), \
+                or a picture such as sky.jpg".to_owned()
+        };
         let digits = text.strip_prefix('#').ok_or_else(expected)?;
         let digits: Option<Vec<u32>> = digits.chars().map(|digit| digit.to_digit(16)).collect();
         let bytes = match digits.as_deref() {

@@ -161,7 +161,7 @@ const FAILURES: &[(&str, i32, &str)] = &[
     (
         "render square.obj -o a.gif",
         2,
-        "a.gif: has no suffix of a picture; pictures are written as .png, .jpg, .jpeg, .tif, .tiff, \
+        "a.gif: is of no format that is written; pictures are written as .png, .jpg, .jpeg, .tif, .tiff, \
             .webp, .exr, .pfm, .npy",
     ),
     (
@@ -204,7 +204,8 @@ const FAILURES: &[(&str, i32, &str)] = &[
     (
         "render square.obj -o a.png --background red",
         2,
-        "expected none, a colour such as #8ab4d8, or a picture such as sky.jpg",
+        "expected none, a colour such as '#8ab4d8' (in quotes, since shells take # for a comment), or a \
+            picture such as sky.jpg",
     ),
     (
         "render square.obj -o a.png --exposure bright",
@@ -257,18 +258,43 @@ const FAILURES: &[(&str, i32, &str)] = &[
         5,
         "the extension KHR_texture_basisu is required",
     ),
-    ("render gone.obj -o a.png", 6, "gone.obj: cannot be read: "),
+    (
+        "render gone.obj -o a.png",
+        6,
+        "gone.obj: there is no such file",
+    ),
     (
         "render square.obj -o nowhere/a.png",
         6,
-        "nowhere/a.png: cannot be written into nowhere",
+        "nowhere/a.png: there is no folder nowhere; make it first",
     ),
     (
         "render square.obj -o folder.png",
         6,
-        "folder.png: cannot be written: ",
+        "folder.png: is a folder; name a file in it, such as folder.png/square.png",
     ),
-    ("info gone.glb", 6, "gone.glb: cannot be read: "),
+    ("info gone.glb", 6, "gone.glb: there is no such file"),
+    (
+        "info squrae.obj",
+        6,
+        "squrae.obj: there is no such file; did you mean \"square.obj\"?",
+    ),
+    ("render gone.png -o a.png", 5, "gone.png: is a picture"),
+    (
+        "render . -o a.png",
+        6,
+        ".: is a folder; name the model in it",
+    ),
+    (
+        "render square.obj a.png",
+        2,
+        "tip: the picture to write is named by -o: -o a.png",
+    ),
+    (
+        "render square.obj -o a.png --eye 1 2 3",
+        2,
+        "tip: coordinates are one word: 1,2,3",
+    ),
 ];
 
 #[test]

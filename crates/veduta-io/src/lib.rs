@@ -22,6 +22,7 @@ mod map_file;
 ))]
 mod read;
 mod read_picture;
+mod reason;
 mod scale;
 pub mod tone;
 mod write;
@@ -44,9 +45,12 @@ pub use read::{LevelOfDetail, LevelOfDetailError};
 #[cfg(feature = "toml")]
 pub use read::{change_scene, closest_name, scene_file_schema, set_in_scene};
 pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
+pub use reason::reason;
 pub use scale::scaled;
 pub use write::{
     ExrCompression, MODEL_SUFFIXES, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples,
     WriteError, WriteProblem, remove_unfinished, stream_picture, write_model, write_picture,
     write_picture_as,
 };
+#[cfg(feature = "exr")]
+pub use write::{Layers, stream_layers, write_layers};

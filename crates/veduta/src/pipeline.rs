@@ -1,18 +1,22 @@
-//! The order of the stages: the only file that knows it.
+//! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
+//! the light and `pipeline/deep.rs` for deep pictures.
 
+mod aovs;
 mod deep;
 
 pub use deep::render_deep;
 
-use crate::accumulate::{self, Picture};
+use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};
 use crate::scene::{AlphaMode, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
 use crate::visibility::multiscan::{self, Spans};
 use crate::visibility::{self, Seen, Strips, speculative};
+use aovs::{AovBuffers, AovMaker};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use std::sync::Mutex;
 use veduta_map::{Camera, FaceId, Faces, MaterialId, VisibilityMap};
 
 /// How a picture is made.
@@ -26,16 +30,19 @@ pub struct RenderSettings {
     pub sampling: Sampling,
     /// Materials show their colour as it is, without light.
     pub unlit: bool,
+    /// Channels that are made beside the light.
+    pub aovs: AovSettings,
 }
 
 impl Default for RenderSettings {
-    /// 1280 x 720, exact, lit.
+    /// 1280 x 720, exact, lit, light alone.
     fn default() -> Self {
         Self {
             width: 1280,
             height: 720,
             sampling: Sampling::Exact,
             unlit: false,
+            aovs: AovSettings::default(),
         }
     }
 }
@@ -65,6 +72,8 @@ pub enum Shortcoming {
 pub struct Rendered {
     /// The picture.
     pub picture: Picture,
+    /// The channels that were asked for beside it.
+    pub aovs: Aovs,
     /// In ascending order.
     pub shortcomings: Vec<Shortcoming>,
 }
@@ -131,7 +140,7 @@ pub fn render(
         begin(Step::FindingVisibility);
         let spans = multiscan::find_spans(&faces, grid.width, grid.height, n);
         begin(Step::Shading);
-        return render_spans(scene, camera, &faces, &spans, settings.unlit);
+        return render_spans(scene, camera, &faces, &spans, settings);
     }
     if faces.len() > grid.pixel_count() {
         let strips = faces.len().div_ceil(FACES_PER_STRIP);
@@ -140,13 +149,16 @@ pub fn render(
     begin(Step::FindingVisibility);
     let map = map_of(camera, faces, [0.0, 1.0]);
     begin(Step::Shading);
+    let (picture, aovs) = render_channels(scene, &map, &grid, settings.unlit, settings.aovs);
     Rendered {
-        picture: render_window(scene, &map, &grid, settings.unlit),
+        picture,
+        aovs,
         shortcomings: shortcomings(scene, &map),
     }
 }
 
-/// Makes the picture of a map of `scene`, which must be the scene that the map was made of.
+/// Makes the picture of a map of `scene`, which must be the scene that the map was made of. Channels
+/// beside the light are made by [`render_channels`].
 ///
 /// # Panics
 /// If the size is 0, or `settings` ask for other than [`Sampling::Exact`]: a map has no sub-scanlines.
@@ -164,45 +176,116 @@ pub fn render_map(scene: &Scene, map: &VisibilityMap, settings: &RenderSettings)
 /// # Panics
 /// If the picture is too large for the machine's memory.
 pub fn render_window(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Picture {
-    let textures = Textures::new(scene, &materials_seen(scene, map));
-    let mut pixels = vec![[0.0; 4]; grid.pixel_count()];
-    render_pixels(scene, &textures, map, grid, unlit, &mut pixels);
-    Picture {
-        width: grid.width,
-        height: grid.height,
-        pixels,
-    }
+    render_channels(scene, map, grid, unlit, AovSettings::default()).0
 }
 
-/// Makes the pixels of `grid`, all of which are overwritten.
-fn render_pixels(
+/// [`render_window`] with channels beside the light.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory.
+pub fn render_channels(
     scene: &Scene,
-    textures: &Textures,
     map: &VisibilityMap,
     grid: &PixelGrid,
     unlit: bool,
-    pixels: &mut [[f32; 4]],
-) {
-    let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
-    let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
-    let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
-    let bands = Bands::new(map, *grid);
-    let band_pixels = grid.width as usize * BAND_ROWS as usize;
-    pixels
-        .par_chunks_mut(band_pixels)
-        .enumerate()
-        .for_each_init(BandBuffers::default, |buffers, (band, pixels)| {
-            let varies = |fragment| surfaces.varies(fragment);
-            dice::dice(
-                map,
-                &bands,
-                band,
-                varies,
-                &mut buffers.dicer,
-                &mut buffers.parts,
-            );
-            buffers.finish(&surfaces, grid, bands.rows(band).start, pixels);
-        });
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
+    let textures = Textures::new(scene, &materials_seen(scene, map));
+    let mut canvas = Canvas::new(grid, aovs);
+    canvas.paint_map(scene, &textures, map, grid, unlit, 0);
+    (canvas.picture, canvas.aovs)
+}
+
+/// A picture in the making.
+struct Canvas {
+    picture: Picture,
+    aovs: Aovs,
+    settings: AovSettings,
+}
+
+impl Canvas {
+    /// Nothing yet of a picture of the size of `grid`.
+    fn new(grid: &PixelGrid, settings: AovSettings) -> Self {
+        Self {
+            picture: Picture {
+                width: grid.width,
+                height: grid.height,
+                pixels: vec![[0.0; 4]; grid.pixel_count()],
+            },
+            aovs: Aovs::new(&settings, grid.pixel_count()),
+            settings,
+        }
+    }
+
+    /// Makes the pixels of `grid`, which are those of the picture from row `first_row` on.
+    fn paint_map(
+        &mut self,
+        scene: &Scene,
+        textures: &Textures,
+        map: &VisibilityMap,
+        grid: &PixelGrid,
+        unlit: bool,
+        first_row: usize,
+    ) {
+        let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+        let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
+        let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
+        let maker = self.maker(scene, textures, camera, faces, &shown);
+        let bands = Bands::new(map, *grid);
+        let varies = |fragment| {
+            let for_maker = maker.as_ref().is_some_and(|maker| maker.varies(fragment));
+            for_maker || surfaces.varies(fragment)
+        };
+        let dice = |band: usize, buffers: &mut BandBuffers| {
+            let BandBuffers { dicer, parts, .. } = buffers;
+            dice::dice(map, &bands, band, varies, dicer, parts);
+        };
+        self.paint(&surfaces, maker.as_ref(), grid, first_row, dice);
+    }
+
+    /// What makes the channels beside the light, if there are any.
+    fn maker<'a>(
+        &self,
+        scene: &'a Scene,
+        textures: &'a Textures<'a>,
+        camera: &'a Camera,
+        faces: &'a Faces,
+        shown: &'a [FaceId],
+    ) -> Option<AovMaker<'a>> {
+        let settings = self.settings;
+        (!settings.is_empty())
+            .then(|| AovMaker::new(scene, textures, camera, faces, shown, settings))
+    }
+
+    /// Makes the bands of `grid` from their parts, which `dice` finds.
+    fn paint(
+        &mut self,
+        surfaces: &Surfaces,
+        maker: Option<&AovMaker>,
+        grid: &PixelGrid,
+        first_row: usize,
+        dice: impl Fn(usize, &mut BandBuffers) + Sync,
+    ) {
+        let first = first_row * grid.width as usize;
+        let light = &mut self.picture.pixels[first..first + grid.pixel_count()];
+        // Bands own their pixels, so that the order in which they are put changes nothing.
+        let aovs = Mutex::new(&mut self.aovs);
+        let band_pixels = grid.width as usize * BAND_ROWS as usize;
+        light.par_chunks_mut(band_pixels).enumerate().for_each_init(
+            BandBuffers::default,
+            |buffers, (band, light)| {
+                dice(band, buffers);
+                let row = band as u32 * BAND_ROWS;
+                buffers.finish(surfaces, grid, row, light);
+                if let Some(maker) = maker {
+                    let (parts, aov_buffers) = (&buffers.parts, &mut buffers.aovs);
+                    let part = maker.make(parts, grid, row, light.len(), aov_buffers);
+                    let mut aovs = aovs.lock().expect("no thread ends while it puts a band");
+                    aovs.put(first + band * band_pixels, &part);
+                }
+            },
+        );
+    }
 }
 
 /// Makes a picture of what multiscan found.
@@ -211,35 +294,29 @@ fn render_spans(
     camera: &Camera,
     faces: &Faces,
     spans: &Spans,
-    unlit: bool,
+    settings: &RenderSettings,
 ) -> Rendered {
     let shown = spans.faces();
     let materials = shown.iter().map(|&face| material_of(scene, faces, face));
     let materials: BTreeSet<MaterialId> = materials.collect();
     let textures = Textures::new(scene, &materials);
-    let light = Daylight::default();
+    let (light, unlit) = (Daylight::default(), settings.unlit);
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
     let grid = PixelGrid::of_frame(spans.width(), spans.height());
-    let mut pixels = vec![[0.0; 4]; grid.pixel_count()];
-    let band_pixels = grid.width as usize * BAND_ROWS as usize;
-    pixels
-        .par_chunks_mut(band_pixels)
-        .enumerate()
-        .for_each_init(BandBuffers::default, |buffers, (band, pixels)| {
-            let first = band as u32 * BAND_ROWS;
-            let rows = first..(first + BAND_ROWS).min(grid.height);
-            let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
-            dice::dice_spans(spans, rows, fragment_of, dicer, parts);
-            buffers.finish(&surfaces, &grid, first, pixels);
-        });
+    let mut canvas = Canvas::new(&grid, settings.aovs);
+    let maker = canvas.maker(scene, &textures, camera, faces, &shown);
+    let dice = |band: usize, buffers: &mut BandBuffers| {
+        let first = band as u32 * BAND_ROWS;
+        let rows = first..(first + BAND_ROWS).min(grid.height);
+        let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
+        dice::dice_spans(spans, rows, fragment_of, dicer, parts);
+    };
+    canvas.paint(&surfaces, maker.as_ref(), &grid, 0, dice);
     let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
     Rendered {
-        picture: Picture {
-            width: grid.width,
-            height: grid.height,
-            pixels,
-        },
+        picture: canvas.picture,
+        aovs: canvas.aovs,
         shortcomings: shortcomings_of(scene, materials, veils),
     }
 }
@@ -258,7 +335,7 @@ fn render_strips(
     mut begin: impl FnMut(Step),
 ) -> Rendered {
     let frame = PixelGrid::of_frame(settings.width, settings.height);
-    let (width, height) = (frame.width as usize, frame.height as usize);
+    let height = frame.height as usize;
     let count = strips.clamp(1, height);
     let rows: Vec<usize> = (0..=count).map(|strip| strip * height / count).collect();
     let border = |&row: &usize| row as f64 / height as f64;
@@ -266,7 +343,7 @@ fn render_strips(
     let in_view = faces.ids().map(|face| material_of(scene, faces, face));
     let textures = Textures::new(scene, &in_view.collect());
 
-    let mut pixels = vec![[0.0; 4]; width * height];
+    let mut canvas = Canvas::new(&frame, settings.aovs);
     let mut seen = BTreeSet::new();
     let mut veils = 0;
     for strip in 0..count {
@@ -277,17 +354,13 @@ fn render_strips(
         let map = map_of(camera, strips.cut(strip).faces, strips.extent(strip));
         let [first, end] = [rows[strip], rows[strip + 1]];
         let grid = frame.window(0.0, first as f64, frame.width, (end - first) as u32);
-        let pixels = &mut pixels[first * width..end * width];
-        render_pixels(scene, &textures, &map, &grid, settings.unlit, pixels);
+        canvas.paint_map(scene, &textures, &map, &grid, settings.unlit, first);
         seen.extend(materials_seen(scene, &map));
         veils += map.veils.len();
     }
     Rendered {
-        picture: Picture {
-            width: settings.width,
-            height: settings.height,
-            pixels,
-        },
+        picture: canvas.picture,
+        aovs: canvas.aovs,
         shortcomings: shortcomings_of(scene, seen, veils),
     }
 }
@@ -300,6 +373,7 @@ struct BandBuffers {
     parts: Parts,
     radiance: Radiance,
     sums: Vec<[f64; 4]>,
+    aovs: AovBuffers,
 }
 
 impl BandBuffers {

@@ -3,17 +3,18 @@
 use super::look::Look;
 use super::output::Output;
 use super::stored::{Changes, open, refuse_place, summary, tell_work};
-use super::{tell_shortcomings, unknown_name};
+use super::{tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::Names;
 use clap::Args;
 use std::path::PathBuf;
 use veduta::composite::{CompositeError, hold_out};
+use veduta::dice::PixelGrid;
 use veduta::map::SeenScene;
 use veduta::map::file::Source;
-use veduta::pipeline::{self, RenderSettings};
-use veduta_io::write_map;
+use veduta::pipeline;
+use veduta_io::{Layers, write_map};
 
 /// Put stored maps together by depth
 ///
@@ -69,8 +70,12 @@ impl Composite {
                 refuse_place(place, force)?;
                 None
             }
-            None => self.output.target(json)?,
+            None => self.output.target(&self.maps[0], json)?,
         };
+        if map_place.is_some() && self.output.has_layers() {
+            let message = "a map is of no picture: --aov is not for .veduta";
+            return Err(Failure::new(Code::Usage, message));
+        }
         if map_place.is_none() && target.is_none() {
             let message = "a composite is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
@@ -109,17 +114,21 @@ impl Composite {
             let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
             tell_shortcomings(&self.maps[0], &seen.scene, &shortcomings, self.strict, talk)?;
             talk.begin("shading");
-            let settings = RenderSettings {
-                width,
-                height,
-                unlit: self.look.unlit,
-                ..RenderSettings::default()
+            let grid = PixelGrid::of_frame(width, height);
+            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
+            let (mut picture, aovs) =
+                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+            let layers = Layers {
+                aovs: &aovs,
+                scene: &seen.scene,
+                camera: &seen.map.camera,
+                grid,
             };
-            let mut picture = pipeline::render_map(&seen.scene, &seen.map, &settings);
+            tell_of_mattes(&self.maps[0], &layers, self.strict, talk)?;
             talk.begin("developing");
             told["exposure"] = development.develop(&mut picture, !target.linear).into();
             talk.begin("writing");
-            target.write(&picture)?;
+            target.write(&picture, self.output.has_layers().then_some(&layers))?;
             told["output"] = target.name().into();
         }
         talk.end();

@@ -18,11 +18,12 @@ mod stored;
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use clap::{Args, ValueEnum};
+use output::Output;
 use std::path::Path;
 use veduta::pipeline::Shortcoming;
 use veduta::scene::Scene;
 use veduta_io::{
-    LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
+    Layers, LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
 };
 
 /// `--up-axis`
@@ -81,6 +82,17 @@ impl Reading {
 
 /// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.
 fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result<Loaded, Failure> {
+    if path.is_dir() {
+        let message = format!("{}: is a folder; name the model in it", path.display());
+        return Err(Failure::new(Code::InputOutput, message));
+    }
+    if is_picture(path) {
+        let message = format!(
+            "{}: is a picture; a model or a scene file is needed",
+            path.display()
+        );
+        return Err(Failure::new(Code::Unsupported, message));
+    }
     talk.begin("reading");
     let loaded = read_scene(path, &reading.options())?;
     talk.end();
@@ -114,6 +126,42 @@ fn tell_shortcomings(
             }
             other => format!("{file}: not shown as it should be: {other:?}"),
         };
+        if strict {
+            let message = format!("{message} (an error because of --strict)");
+            return Err(Failure::new(Code::Unsupported, message));
+        }
+        talk.warn(message);
+    }
+    Ok(())
+}
+
+/// Warns of mattes that do not tell all of the picture of `file`; if strict, fails.
+fn tell_of_mattes(
+    file: &Path,
+    layers: &Layers,
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    let mut messages = Vec::new();
+    let mattes = [&layers.aovs.object_matte, &layers.aovs.material_matte];
+    let mattes = mattes.into_iter().flatten();
+    if let Some(matte) = mattes.max_by_key(|matte| matte.most)
+        && matte.most > matte.ranks
+    {
+        let enough = matte.most.min(usize::from(Output::MOST_RANKS));
+        messages.push(format!(
+            "a pixel shows up to {} names, and the Cryptomatte tells the {} largest; \
+             --crypto-ranks {enough} tells more",
+            matte.most, matte.ranks
+        ));
+    }
+    for [a, b] in layers.collisions() {
+        messages.push(format!(
+            "{a:?} and {b:?} have the same id in a Cryptomatte; rename one to tell them apart"
+        ));
+    }
+    for message in messages {
+        let message = format!("{}: {message}", file.display());
         if strict {
             let message = format!("{message} (an error because of --strict)");
             return Err(Failure::new(Code::Unsupported, message));

@@ -7,11 +7,11 @@ use crate::values::Size;
 use clap::{Args, ValueEnum};
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
-use veduta::accumulate::Picture;
+use veduta::accumulate::{AovSettings, Picture};
 use veduta_io::deep_exr::DeepCompression;
 use veduta_io::{
-    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem, is_map,
-    stream_picture, write_picture_as,
+    ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
+    is_map, reason, stream_layers, stream_picture, write_layers, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -36,6 +36,17 @@ pub struct Output {
     /// Store an .exr in tiles of this many pixels a side; in scanlines by default
     #[arg(long, value_name = "SIDE", value_parser = clap::value_parser!(u32).range(1..=65_535), requires = "output")]
     tile: Option<u32>,
+    /// Write further channels into an .exr, separated by commas
+    ///
+    /// Depth, normal, position and numbers are those of the face that covers most of the pixel, at the
+    /// centroid of what is seen of it, and not filtered; albedo and Cryptomatte are exact areas. Where
+    /// nothing is seen, depth is 1e10 and all else 0. The camera is told by worldToCamera and
+    /// worldToNDC.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "output")]
+    aov: Vec<AovArgument>,
+    /// How many names a Cryptomatte can tell of a pixel, rounded up to an even number; 6 by default
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=i64::from(Output::MOST_RANKS)), requires = "aov")]
+    crypto_ranks: Option<u8>,
     /// Show the picture small in the terminal: as kitty graphics, sixel or half blocks, chosen by
     /// what the terminal says of itself, or as told (also into a pipe)
     #[arg(
@@ -77,6 +88,32 @@ enum CompressionArgument {
     Piz,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum AovArgument {
+    /// Z: metres along the line of sight's axis, larger is farther
+    Depth,
+    /// N.X, N.Y, N.Z in world space, towards the eye
+    Normal,
+    /// P.X, P.Y, P.Z in world space, in metres
+    Position,
+    /// albedo.R, albedo.G, albedo.B: colours without light, premultiplied
+    Albedo,
+    /// id.object: its place in the list that `veduta info --json` tells of the input, counted from 1;
+    /// 0 for none
+    Object,
+    /// id.material: likewise
+    Material,
+    /// id.face: likewise, in its object
+    Face,
+    /// Cryptomatte of the objects' names: exact coverage
+    CryptoObject,
+    /// Cryptomatte of the materials' names
+    CryptoMaterial,
+}
+
+/// Names that a Cryptomatte tells of a pixel unless told; what other programs write.
+const USUAL_RANKS: u8 = 6;
+
 /// `--format`
 fn format(name: &str) -> Result<PictureFormat, String> {
     PictureFormat::of_suffix(name)
@@ -100,6 +137,9 @@ enum Place {
 }
 
 impl Output {
+    /// The most names of a pixel in a Cryptomatte: 99 layers of two.
+    pub const MOST_RANKS: u8 = 198;
+
     /// The place of a stored map, if one is asked for.
     pub fn map_place(&self) -> Option<&Path> {
         let output = self.output.as_deref();
@@ -107,7 +147,9 @@ impl Output {
     }
 
     /// The place of a picture asked for, if one is.
-    pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
+    ///
+    /// `input` is the file that the picture is made of.
+    pub fn target(&self, input: &Path, json: bool) -> Result<Option<Target>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);
         };
@@ -129,6 +171,9 @@ impl Output {
             Place::Stdout
         } else {
             refuse_output_nowhere(output)?;
+            let name = input.with_extension("png");
+            let name = name.file_name().unwrap_or("picture.png".as_ref());
+            refuse_folder(output, &name.to_string_lossy())?;
             Place::File(output.clone())
         };
         let format = match (self.format, &place) {
@@ -142,6 +187,9 @@ impl Output {
         let for_exr = self.compression.is_some() || self.tile.is_some();
         if for_exr && format != PictureFormat::Exr {
             return usage("--compression and --tile are for .exr".into());
+        }
+        if self.has_layers() && format != PictureFormat::Exr {
+            return usage("--aov is for .exr".into());
         }
         let options = self.options();
         let samples = options.samples_in(format);
@@ -180,6 +228,40 @@ impl Output {
             compression,
             samples,
         })
+    }
+
+    /// Whether channels are asked for beside the light.
+    pub fn has_layers(&self) -> bool {
+        !self.aov.is_empty()
+    }
+
+    /// Whether numbers of objects, materials or faces are asked for.
+    pub fn has_numbers(&self) -> bool {
+        let of_scene = [
+            AovArgument::Object,
+            AovArgument::Material,
+            AovArgument::Face,
+        ];
+        self.aov.iter().any(|aov| of_scene.contains(aov))
+    }
+
+    /// The channels asked for beside the light.
+    pub fn aovs(&self) -> AovSettings {
+        let asks_for = |aov| self.aov.contains(&aov);
+        let ranks = self.crypto_ranks.unwrap_or(USUAL_RANKS);
+        let ranks = usize::from(ranks).next_multiple_of(2);
+        let ranks_of = |aov| if asks_for(aov) { ranks } else { 0 };
+        AovSettings {
+            depth: asks_for(AovArgument::Depth),
+            normal: asks_for(AovArgument::Normal),
+            position: asks_for(AovArgument::Position),
+            albedo: asks_for(AovArgument::Albedo),
+            object: asks_for(AovArgument::Object),
+            material: asks_for(AovArgument::Material),
+            face: asks_for(AovArgument::Face),
+            object_ranks: ranks_of(AovArgument::CryptoObject),
+            material_ranks: ranks_of(AovArgument::CryptoMaterial),
+        }
     }
 
     fn options(&self) -> PictureOptions {
@@ -241,14 +323,22 @@ impl Target {
         }
     }
 
-    /// Writes the picture there.
-    pub fn write(&self, picture: &Picture) -> Result<(), Failure> {
+    /// Writes the picture there, with `layers` if it is an .exr.
+    pub fn write(&self, picture: &Picture, layers: Option<&Layers>) -> Result<(), Failure> {
+        let (format, options) = (self.format, &self.options);
         let Place::File(path) = &self.place else {
             let mut stdout = io::stdout().lock();
-            let written = stream_picture(&mut stdout, self.format, picture, &self.options);
-            return written.or_else(written_to_stdout);
+            let streamed = match layers {
+                Some(layers) => stream_layers(&mut stdout, picture, layers, options),
+                None => stream_picture(&mut stdout, format, picture, options),
+            };
+            return streamed.or_else(written_to_stdout);
         };
-        Ok(write_picture_as(path, self.format, picture, &self.options)?)
+        let written = match layers {
+            Some(layers) => write_layers(path, picture, layers, options),
+            None => write_picture_as(path, format, picture, options),
+        };
+        Ok(written?)
     }
 
     /// The name to tell.
@@ -279,15 +369,28 @@ pub fn refuse_output_nowhere(output: &Path) -> Result<(), Failure> {
         .filter(|folder| !folder.as_os_str().is_empty());
     let found = folder.map_or(Ok(()), |folder| match std::fs::metadata(folder) {
         Ok(metadata) if metadata.is_dir() => Ok(()),
-        Ok(_) => Err("it is not a folder".to_owned()),
-        Err(error) => Err(error.to_string()),
+        Ok(_) => Err(format!("{} is not a folder", folder.display())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Err(format!(
+            "there is no folder {}; make it first",
+            folder.display()
+        )),
+        Err(error) => Err(format!("{}: {}", folder.display(), reason(&error))),
     });
-    found.map_err(|reason| {
-        let folder = folder.unwrap_or(output).display();
-        let message = format!(
-            "{}: cannot be written into {folder}: {reason}",
-            output.display()
-        );
+    found.map_err(|problem| {
+        let message = format!("{}: {problem}", output.display());
         Failure::new(Code::InputOutput, message)
     })
+}
+
+/// Fails where a folder stands in the place of the file. `name` is that of a file, for the message.
+fn refuse_folder(output: &Path, name: &str) -> Result<(), Failure> {
+    if !output.is_dir() {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: is a folder; name a file in it, such as {}",
+        output.display(),
+        output.join(name).display()
+    );
+    Err(Failure::new(Code::InputOutput, message))
 }

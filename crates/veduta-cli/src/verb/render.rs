@@ -2,18 +2,21 @@ use super::deep::DeepTarget;
 use super::look::Look;
 use super::output::{Output, Target};
 use super::stored::{refuse_place, summary, tell_work};
-use super::{Reading, load, tell_shortcomings, unknown_name};
+use super::{Reading, load, tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
 use crate::values::{self, FieldOfView, Size};
 use clap::Args;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use veduta::accumulate::Aovs;
+use veduta::dice::PixelGrid;
 use veduta::map::{Camera, Projection, SeenScene};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Loaded, scaled, source_of, write_map};
+use veduta_io::{Layers, Loaded, scaled, source_of, write_map};
 
 /// Make a picture of a model
 ///
@@ -41,7 +44,7 @@ pub struct Render {
     #[arg(
         long,
         requires = "output",
-        conflicts_with_all = ["preview", "background", "exposure", "tone"]
+        conflicts_with_all = ["preview", "background", "exposure", "tone", "aov"]
     )]
     deep: bool,
     /// Make every warning an error
@@ -68,6 +71,8 @@ Examples:
       veduta render town.obj -o town.exr --depth half --tile 64
   All that is seen in each pixel, with depths and ids, for deep compositing:
       veduta render town.obj -o deep.exr --deep --depth half
+  With depth and mattes of all objects:
+      veduta render town.obj -o town.exr --aov depth,normal,crypto-object
   What is seen, kept for any number of pictures:
       veduta render town.obj -o kept.veduta
   Onto a photograph, through a pipe:
@@ -115,7 +120,7 @@ impl Render {
         if let Some(place) = self.output.map_place() {
             return self.run_to_map(place, force, json, talk);
         }
-        let target = self.output.target(json)?;
+        let target = self.output.target(&self.model, json)?;
         let deep_target = self.deep_target(&target)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
@@ -124,7 +129,7 @@ impl Render {
             target.refuse_size(size)?;
         }
         let mut scene = loaded.scene;
-        self.keep_layers(&mut scene)?;
+        let rows_before = self.keep_layers(&mut scene)?;
         if let Some(target) = deep_target {
             return self.render_deep(&target, &scene, &camera, size, json, talk);
         }
@@ -149,20 +154,35 @@ impl Render {
             height,
             sampling: self.sampling,
             unlit: self.look.unlit,
+            aovs: self.output.aovs(),
         };
         let Rendered {
             mut picture,
+            mut aovs,
             shortcomings,
         } = pipeline::render(&scene, &camera, &settings, |step| tell_step(step, talk));
         tell_shortcomings(&self.model, &scene, &shortcomings, self.strict, talk)?;
+        // So that pictures of layers give an object the same number.
+        for object in aovs.object.iter_mut().flatten() {
+            if *object != Aovs::NOTHING {
+                *object = rows_before[*object as usize];
+            }
+        }
         talk.begin("developing");
         // Before it is developed, since pictures are scaled in linear light.
         let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
         let mut ev = 0.0;
         if let Some(target) = &target {
             ev = development.develop(&mut picture, !target.linear);
+            let layers = Layers {
+                aovs: &aovs,
+                scene: &scene,
+                camera: &camera,
+                grid: PixelGrid::of_frame(width, height),
+            };
+            tell_of_mattes(&self.model, &layers, self.strict, talk)?;
             talk.begin("writing");
-            target.write(&picture)?;
+            target.write(&picture, self.output.has_layers().then_some(&layers))?;
         }
         if let (Some(screen), Some(preview)) = (screen, &mut preview) {
             match &target {
@@ -223,6 +243,7 @@ impl Render {
             height: size.height,
             sampling: self.sampling,
             unlit: self.look.unlit,
+            ..RenderSettings::default()
         };
         let (samples, shortcomings) = target.write(scene, camera, &settings, talk)?;
         talk.end();
@@ -253,9 +274,10 @@ impl Render {
         talk: &mut Talk,
     ) -> Result<(), Failure> {
         refuse_place(place, force)?;
-        if self.output.preview.is_some() || self.sampling != Sampling::Exact || self.deep {
-            let message =
-                "a map is of no picture: --preview, --sampling and --deep are not for .veduta";
+        let of_pictures = self.output.preview.is_some() || self.output.has_layers() || self.deep;
+        if of_pictures || self.sampling != Sampling::Exact {
+            let message = "a map is of no picture: --preview, --aov, --deep and --sampling are not \
+                for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
         let source = source_of(&self.model)?;
@@ -284,10 +306,10 @@ impl Render {
         Ok(())
     }
 
-    /// Leaves out all layers but those asked for.
-    fn keep_layers(&self, scene: &mut Scene) -> Result<(), Failure> {
+    /// Leaves out all layers but those asked for. Tells of each object that stays its row before.
+    fn keep_layers(&self, scene: &mut Scene) -> Result<Vec<u32>, Failure> {
         if self.layer.is_empty() {
-            return Ok(());
+            return Ok((0..scene.objects.len() as u32).collect());
         }
         let names = scene.layers.iter().map(|layer| layer.name.as_str());
         for name in &self.layer {
@@ -300,8 +322,14 @@ impl Render {
                 return Err(Failure::new(Code::Missing, message));
             }
         }
+        let objects = scene.objects.iter().map(|object| object.name.clone());
+        let rows: HashMap<String, u32> = objects.zip(0..).collect();
         scene.keep_layers(|layer| self.layer.contains(&layer.name));
-        Ok(())
+        Ok(scene
+            .objects
+            .iter()
+            .map(|object| rows[&object.name])
+            .collect())
     }
 }
 

@@ -3,7 +3,7 @@
 use super::look::Look;
 use super::output::Output;
 use super::stored::{Changes, open, tell_work};
-use super::tell_shortcomings;
+use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Size};
@@ -12,6 +12,7 @@ use std::path::PathBuf;
 use veduta::dice::PixelGrid;
 use veduta::pipeline;
 use veduta_geometry::DVec2;
+use veduta_io::Layers;
 
 /// Make a picture of a stored map
 ///
@@ -57,10 +58,15 @@ Examples:
 
 impl Shade {
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let Some(target) = self.output.target(json)? else {
+        let Some(target) = self.output.target(&self.map, json)? else {
             let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         };
+        if self.window.is_some() && self.output.has_numbers() {
+            let message = "numbers of objects, materials and faces are those of a whole map; leave \
+                --window out, or ask for --aov crypto-object";
+            return Err(Failure::new(Code::Usage, message));
+        }
         talk.begin("reading");
         let mut map = open(&self.map)?;
         let [width, height] = map.reader().size();
@@ -93,11 +99,20 @@ impl Shade {
         talk.begin("shading");
         let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
         tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
-        let mut picture = pipeline::render_window(&seen.scene, &seen.map, &grid, self.look.unlit);
+        let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
+        let (mut picture, aovs) =
+            pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+        let layers = Layers {
+            aovs: &aovs,
+            scene: &seen.scene,
+            camera: &seen.map.camera,
+            grid,
+        };
+        tell_of_mattes(&self.map, &layers, self.strict, talk)?;
         talk.begin("developing");
         let ev = development.develop(&mut picture, !target.linear);
         talk.begin("writing");
-        target.write(&picture)?;
+        target.write(&picture, self.output.has_layers().then_some(&layers))?;
         talk.end();
         talk.detail(format_args!("exposure {ev:.2} EV"));
         if json {

@@ -19,7 +19,7 @@ fn sound_files_pass_and_damaged_ones_fail_the_whole() {
     for expected in [
         "error: broken.obj:2: refers to vertex 2",
         "error: broken.png: is damaged: ",
-        "error: gone.glb: cannot be read: ",
+        "error: gone.glb: there is no such file",
         "4 files, 3 failed",
     ] {
         assert!(told.contains(expected), "{expected}: {told}");

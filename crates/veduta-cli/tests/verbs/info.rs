@@ -1,5 +1,5 @@
 use crate::{FACING, Folder};
-use serde_json::json;
+use serde_json::{Value, json};
 
 #[test]
 fn a_pick_tells_object_face_material_and_place() {
@@ -122,4 +122,123 @@ fn of_pictures_their_size_and_light_is_told() {
     // A quarter is covered, a quarter of that blue.
     assert_eq!(found["mean"], json!([0.1875, 0.0, 0.0625, 0.25]));
     assert!(folder.told("info a.npy").contains("8 x 8 pixels"));
+}
+
+/// A triangle that glows, and a light of each kind: a sun that shines downwards, a bulb, and a spot
+/// with cones of 20 and 45 degrees.
+const LIGHTS: &str = r#"{
+    "asset": { "version": "2.0" },
+    "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_emissive_strength"],
+    "extensions": { "KHR_lights_punctual": { "lights": [
+        { "name": "sun", "type": "directional", "intensity": 80000 },
+        { "name": "bulb", "type": "point", "intensity": 120, "color": [1, 0.5, 0.25], "range": 9 },
+        { "name": "lamp", "type": "spot", "intensity": 900, "spot": {
+            "innerConeAngle": 0.3490658503988659, "outerConeAngle": 0.7853981633974483 } }
+    ] } },
+    "scenes": [{ "nodes": [0, 1, 2, 3] }],
+    "nodes": [
+        { "mesh": 0 },
+        { "rotation": [-0.7071067811865476, 0, 0, 0.7071067811865476],
+            "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+        { "translation": [1, 2, 3], "extensions": { "KHR_lights_punctual": { "light": 1 } } },
+        { "translation": [0, 2.5, 0], "extensions": { "KHR_lights_punctual": { "light": 2 } } }
+    ],
+    "materials": [{ "name": "neon", "emissiveFactor": [1, 0.5, 0], "emissiveTexture": { "index": 0 },
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 4 } } }],
+    "textures": [{ "source": 0 }],
+    "images": [{ "name": "tube", "uri": "tube.png" }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "material": 0 }] }],
+    "accessors": [
+        { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+            "min": [0, 0, 0], "max": [1, 1, 0] },
+        { "bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2" }
+    ],
+    "bufferViews": [{ "buffer": 0, "byteLength": 36 }, { "buffer": 0, "byteOffset": 36, "byteLength": 24 }],
+    "buffers": [{ "uri": "lights.bin", "byteLength": 60 }]
+}"#;
+
+fn folder_with_lights() -> Folder {
+    let folder = Folder::new();
+    folder.write("lights.gltf", LIGHTS);
+    let positions = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let texcoords = [0.0f32, 0.0, 1.0, 0.0, 0.0, 1.0];
+    let numbers = positions.into_iter().chain(texcoords);
+    folder.write(
+        "lights.bin",
+        numbers.flat_map(f32::to_le_bytes).collect::<Vec<u8>>(),
+    );
+    folder.told("render town.obj --size 4x2 -o tube.png");
+    folder
+}
+
+#[test]
+fn lights_are_told_with_place_strength_and_cones() {
+    let folder = folder_with_lights();
+    let told = folder.json("info lights.gltf");
+    let lights = told["lights"].as_array().expect("a list");
+    // Y up becomes Z up, and what shone along -Z of the file shines along +Y.
+    let expected = [
+        json!({ "name": "sun", "kind": "directional", "illuminance": 80000.0,
+            "color": [1.0, 1.0, 1.0], "direction": [0.0, 0.0, -1.0] }),
+        json!({ "name": "bulb", "kind": "point", "intensity": 120.0, "color": [1.0, 0.5, 0.25],
+            "range": 9.0, "position": [1.0, -3.0, 2.0] }),
+        json!({ "name": "lamp", "kind": "spot", "intensity": 900.0, "color": [1.0, 1.0, 1.0],
+            "range": null, "position": [0.0, 0.0, 2.5], "direction": [0.0, 1.0, 0.0],
+            "innerAngle": 20.0, "outerAngle": 45.0 }),
+    ];
+    assert_eq!(lights.len(), expected.len());
+    for (found, expected) in lights.iter().zip(&expected) {
+        let keys = |value: &Value| -> Vec<String> {
+            value
+                .as_object()
+                .expect("an object")
+                .keys()
+                .cloned()
+                .collect()
+        };
+        assert_eq!(keys(found), keys(expected));
+        for key in keys(expected) {
+            assert!(about_equal(&found[&key], &expected[&key]), "{key}: {found}");
+        }
+    }
+    let text = folder.told("info lights.gltf");
+    for line in [
+        "lights    3",
+        "sun  directional, 80000 lx, colour 1.000 1.000 1.000, shines along 0, 0, -1\n",
+        "bulb  point, 120 cd, colour 1.000 0.500 0.250, at 1, -3, 2 m, reaches 9 m\n",
+        "lamp  spot, 900 cd, colour 1.000 1.000 1.000, at 0, 0, 2.5 m, shines along 0, 1, 0, \
+            full to 20.0deg from its axis, none from 45.0deg\n",
+    ] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+}
+
+/// Whether two values are the same but for the last bits of single precision.
+fn about_equal(a: &Value, b: &Value) -> bool {
+    match (a, b) {
+        (Value::Array(a), Value::Array(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| about_equal(a, b))
+        }
+        (Value::Number(a), Value::Number(b)) => {
+            let [a, b] = [a, b].map(|number| number.as_f64().expect("a number"));
+            (a - b).abs() <= 1e-5
+        }
+        _ => a == b,
+    }
+}
+
+#[test]
+fn what_materials_emit_is_told() {
+    let folder = folder_with_lights();
+    let told = folder.json("info lights.gltf");
+    let neon = &told["materials"][0];
+    assert_eq!(neon["emissive"], json!([4.0, 2.0, 0.0]));
+    assert_eq!(neon["emissiveTexture"], "tube");
+    assert_eq!(neon["texture"], json!(null));
+    let text = folder.told("info lights.gltf");
+    let expected = "neon  colour 1.000 1.000 1.000 1.000, opaque; emits 4.000 2.000 0.000, \
+        texture tube (4 x 2)\n";
+    assert!(text.contains(expected), "{text}");
+    // Of what does not glow nothing is said.
+    assert!(!folder.told("info town.obj").contains("emits"));
 }

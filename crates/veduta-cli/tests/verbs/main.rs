@@ -10,6 +10,7 @@ mod info;
 mod pictures;
 mod pipes;
 mod preview;
+mod readme;
 mod stored;
 
 use assert_cmd::Command;

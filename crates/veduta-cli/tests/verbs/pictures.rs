@@ -133,6 +133,9 @@ const SENSELESS: &[(&str, &str)] = &[
         "--compression and --tile are for .exr",
     ),
     ("-o a.exr --tile 0", "--tile"),
+    ("-o a.png --aov depth", "--aov is for .exr"),
+    ("-o a.exr --aov deph", "'depth'"),
+    ("-o a.exr --crypto-ranks 4", "--aov"),
     ("-o a.png --format gif", "expected one of png, jpg"),
     ("-o a.webp --size 16385x1", "at most 16384 pixels a side"),
     ("-o - --json", "both write to stdout"),
@@ -161,4 +164,107 @@ fn a_format_that_is_told_wins_over_the_suffix() {
     let folder = Folder::new();
     folder.told(&format!("render town.obj {FACING} -o picture --format png"));
     assert_eq!(png(&folder.read("picture")).0, 8);
+}
+
+#[test]
+fn further_channels_lie_beside_the_same_picture() {
+    let folder = Folder::new();
+    let render = format!("render town.obj {FACING}");
+    folder.told(&format!("{render} -o plain.exr"));
+    let layers =
+        "--aov depth,normal,position,albedo,object,material,face,crypto-object,crypto-material";
+    for more in ["", "--depth half --tile 4 --compression piz"] {
+        folder.told(&format!("{render} {layers} {more} -o layers.exr"));
+        let found = difference(&folder, "plain.exr", "layers.exr", "");
+        // No number where nothing differs.
+        assert!(found["max"].as_f64().unwrap_or(0.0) < 1e-3, "{found}");
+    }
+    let told = folder.json("info layers.exr");
+    let beside = told["furtherChannels"].as_array().expect("a list");
+    assert_eq!(beside.len(), 1 + 3 + 3 + 3 + 3 + 12 + 12, "{told}");
+    assert!(
+        folder
+            .told("info layers.exr")
+            .contains("N.X, N.Y, N.Z, P.X")
+    );
+    let streamed = folder
+        .veduta(&format!("{render} {layers} --format exr -o -"))
+        .assert()
+        .success();
+    folder.told(&format!("{render} {layers} -o file.exr"));
+    assert!(streamed.get_output().stdout == folder.read("file.exr"));
+}
+
+#[test]
+fn a_cryptomatte_with_too_few_ranks_is_told() {
+    let folder = Folder::new();
+    // Three layers of paper, the upper ones smaller, all seen in one pixel.
+    let sheet = |name: &str, half: f64, z: f64, first: usize| {
+        let corners = [(-half, -half), (half, -half), (half, half), (-half, half)];
+        let vertices = corners.map(|(x, y)| format!("v {x} {y} {z}\n")).concat();
+        let face = [0, 1, 2, 3]
+            .map(|corner| format!(" {}", first + corner))
+            .concat();
+        format!("o {name}\n{vertices}f{face}\n")
+    };
+    let model = [
+        sheet("a", 1.0, 0.0, 1),
+        sheet("b", 0.5, 1.0, 5),
+        sheet("c", 0.25, 2.0, 9),
+    ];
+    folder.write("sheets.obj", model.concat());
+    let view = "--eye 0,-9,0 --look-at 0,0,0 --parallel 4 --size 1x1";
+    let render = format!("render sheets.obj {view} -o a.exr --aov crypto-object");
+    let quiet = folder.veduta(&render).assert().success();
+    assert!(quiet.get_output().stderr.is_empty());
+    let told = folder
+        .veduta(&format!("{render} --crypto-ranks 1"))
+        .assert()
+        .success();
+    let stderr = String::from_utf8_lossy(&told.get_output().stderr).into_owned();
+    let expected = "a pixel shows up to 3 names, and the Cryptomatte tells the 2 largest; \
+        --crypto-ranks 3 tells more";
+    assert!(stderr.contains(expected), "{stderr}");
+    folder
+        .veduta(&format!("{render} --crypto-ranks 2 --strict"))
+        .assert()
+        .code(5);
+}
+
+#[test]
+fn a_stored_map_has_the_same_channels() {
+    let folder = Folder::new();
+    let layers = "--aov depth,object,crypto-object";
+    folder.told(&format!("render town.obj {FACING} -o kept.veduta"));
+    folder.told(&format!("shade kept.veduta {layers} -o shaded.exr"));
+    folder.told(&format!(
+        "render town.obj {FACING} {layers} -o rendered.exr"
+    ));
+    let [shaded, rendered] = ["shaded", "rendered"]
+        .map(|name| folder.json(&format!("info {name}.exr"))["furtherChannels"].clone());
+    assert_eq!(shaded, rendered);
+    assert_eq!(
+        difference(&folder, "shaded.exr", "rendered.exr", "")["differing"],
+        0
+    );
+    folder.told(&format!("composite kept.veduta {layers} -o composite.exr"));
+    for (arguments, message) in [
+        (
+            "render town.obj -o a.veduta --aov depth",
+            "--aov and --sampling are not for .veduta",
+        ),
+        (
+            "composite kept.veduta -o a.veduta --aov depth",
+            "--aov is not for .veduta",
+        ),
+        (
+            "shade kept.veduta -o a.exr --aov face --window 0,0,2,2",
+            "leave --window out, or ask for --aov crypto-object",
+        ),
+    ] {
+        let refused = folder.veduta(arguments).assert().code(2);
+        let stderr = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(stderr.contains(message), "{arguments}: {stderr}");
+    }
+    folder.told("shade kept.veduta -o a.exr --aov crypto-object --window 0,0,2,2");
 }

@@ -49,7 +49,7 @@ impl ReadError {
     /// Who can mend it.
     pub fn kind(&self) -> ErrorKind {
         match self.problem {
-            Problem::Unreadable(_) => ErrorKind::InputOutput,
+            Problem::Unreadable(_) | Problem::NoSuchFile { .. } => ErrorKind::InputOutput,
             Problem::UnknownFormat { .. }
             | Problem::Version { .. }
             | Problem::PointCloud { .. }
@@ -123,8 +123,14 @@ impl fmt::Display for Place {
 #[non_exhaustive]
 pub enum Problem {
     /// The operating system's word.
-    #[error("cannot be read: {0}")]
+    #[error("cannot be read: {}", crate::reason(.0))]
     Unreadable(std::io::Error),
+    /// Nothing stands at the path.
+    #[error("there is no such file{}", asked(.meant))]
+    NoSuchFile {
+        /// The name of a file beside it that may be meant.
+        meant: Option<Box<str>>,
+    },
     /// Neither the suffix nor the first bytes tell what it is.
     #[error("is of no format that is read here; scenes are read from {known}")]
     UnknownFormat {
@@ -187,7 +193,7 @@ pub enum Problem {
         reason: String,
     },
     /// A file that the file names is not there, or is no file.
-    #[error("names {}, which cannot be read: {source}; put it there or export to .glb", path.display())]
+    #[error("names {}, which cannot be read: {}; put it there or export to .glb", path.display(), crate::reason(source))]
     NotThere {
         /// The path that was tried.
         path: PathBuf,
@@ -271,9 +277,9 @@ pub enum Problem {
         limit: f64,
     },
     /// A token of a text file that is not what is expected there.
-    #[error("{found:?} where {expected} is expected")]
+    #[error("{} where {expected} should stand", told(found))]
     Token {
-        /// The token, shortened.
+        /// The token, shortened; empty at the end of the line.
         found: String,
         /// What should stand there.
         expected: &'static str,
@@ -387,6 +393,22 @@ pub enum Problem {
         /// What is wrong; in a box, since errors are passed about by value.
         fault: Box<MeshError>,
     },
+}
+
+/// A token of a text file, for messages.
+fn told(token: &str) -> String {
+    match token {
+        "" => "the line ends".to_owned(),
+        token => format!("{token:?}"),
+    }
+}
+
+/// Whether that name is meant.
+fn asked(meant: &Option<Box<str>>) -> String {
+    match meant {
+        Some(name) => format!("; did you mean {name:?}?"),
+        None => String::new(),
+    }
 }
 
 impl Problem {

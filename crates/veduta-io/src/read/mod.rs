@@ -53,7 +53,7 @@ pub use scene_file::{change_scene, scene_file_schema, set_in_scene};
 use budget::Budget;
 use error::{Fault, Warnings};
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 use veduta::scene::Scene;
 
@@ -123,11 +123,24 @@ pub const SCENE_SUFFIXES: &[&str] = &[
 /// # Errors
 /// When the file cannot be read, is damaged, or needs what is not supported. Never panics.
 pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
-    #[cfg(feature = "toml")]
-    if scene_file::is_scene_file(path) {
-        return scene_file::read(path, options);
-    }
-    read_model(path, options)
+    let read = || {
+        #[cfg(feature = "toml")]
+        if scene_file::is_scene_file(path) {
+            return scene_file::read(path, options);
+        }
+        read_model(path, options)
+    };
+    read().map_err(|error| match error.problem {
+        Problem::Unreadable(ref system) if system.kind() == io::ErrorKind::NotFound => {
+            #[cfg(feature = "toml")]
+            let meant = names::neighbour(path).map(String::into_boxed_str);
+            #[cfg(not(feature = "toml"))]
+            let meant = None;
+            let problem = Problem::NoSuchFile { meant };
+            ReadError { problem, ..error }
+        }
+        _ => error,
+    })
 }
 
 /// Reads a scene from a file that is no scene file.

@@ -49,6 +49,26 @@ pub fn closest<'a>(found: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
     best.map(|(_, name)| name)
 }
 
+/// The name of a file in the same folder as `path`, where nothing stands, that may be meant.
+#[cfg(feature = "toml")]
+pub(crate) fn neighbour(path: &std::path::Path) -> Option<String> {
+    /// A folder with more is no place to guess in.
+    const MOST: usize = 1000;
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(std::path::Path::new("."));
+    let entries = std::fs::read_dir(folder).ok()?.take(MOST);
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    names.sort();
+    let found = path.file_name()?.to_str()?;
+    closest(found, names.iter().map(String::as_str))
+        .filter(|name| *name != found)
+        .map(str::to_owned)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

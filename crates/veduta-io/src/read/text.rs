@@ -111,7 +111,7 @@ fn plain_decimal(token: &[u8]) -> Option<f64> {
 
 pub(crate) fn wrong_token(token: &[u8], expected: &'static str) -> Problem {
     let found = match token {
-        b"" => "end of line".into(),
+        b"" => String::new(),
         _ => shortened(&String::from_utf8_lossy(token)),
     };
     Problem::Token { found, expected }

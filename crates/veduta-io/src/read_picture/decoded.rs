@@ -16,6 +16,8 @@ pub struct Decoded {
     pub samples: Samples,
     /// Whether colour is multiplied by opacity.
     pub premultiplied: bool,
+    /// See [`LoadedPicture::further_channels`].
+    pub further_channels: Vec<String>,
     pub warnings: Vec<String>,
 }
 
@@ -77,6 +79,7 @@ impl Decoded {
                 pixels,
             },
             linear,
+            further_channels: self.further_channels,
             warnings: self.warnings,
         }
     }

@@ -33,6 +33,14 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         .non_parallel()
         .from_buffered(Cursor::new(bytes))
         .map_err(problem)?;
+    let of_picture = ["R", "G", "B", "A"];
+    let channels = meta.headers.iter().flat_map(|header| &header.channels.list);
+    let mut further: Vec<String> = channels
+        .map(|channel| channel.name.to_string())
+        .filter(|name| !of_picture.contains(&name.as_str()))
+        .collect();
+    further.sort();
+    further.dedup();
     let (size, pixels) = image.layer_data.channel_data.pixels;
     let (width, height) = check_size(size.0 as u64, size.1 as u64, bytes.len())?;
     Ok(Decoded {
@@ -41,6 +49,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         channels: Channels::ColorOpacity,
         samples: Samples::F32(pixels.into_flattened()),
         premultiplied: true,
+        further_channels: further,
         warnings: Vec::new(),
     })
 }
@@ -62,6 +71,7 @@ fn read_deep(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         channels: Channels::ColorOpacity,
         samples: Samples::F32(picture.pixels.into_flattened()),
         premultiplied: true,
+        further_channels: Vec::new(),
         warnings,
     })
 }

@@ -30,6 +30,9 @@ pub struct LoadedPicture {
     pub picture: Picture,
     /// Whether the file holds light as it is (floating point), rather than sRGB for a display.
     pub linear: bool,
+    /// Names of the channels that the file has beside the picture's own, ascending: those of an EXR,
+    /// which stay unread.
+    pub further_channels: Vec<String>,
     /// What a user should know; sentences without the file's name.
     pub warnings: Vec<String>,
 }
@@ -49,7 +52,7 @@ pub struct ReadPictureError {
 #[non_exhaustive]
 pub enum PictureProblem {
     /// The operating system's word.
-    #[error("cannot be read: {0}")]
+    #[error("cannot be read: {}", crate::reason(.0))]
     Unreadable(#[from] std::io::Error),
     /// The suffix names no format that is read.
     #[error("has no suffix of a picture; pictures are read from {0}")]

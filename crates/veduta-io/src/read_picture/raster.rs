@@ -45,6 +45,7 @@ pub fn read(bytes: &[u8], format: ImageFormat) -> Result<Decoded, PictureProblem
         channels,
         samples,
         premultiplied: false,
+        further_channels: Vec::new(),
         warnings,
     })
 }

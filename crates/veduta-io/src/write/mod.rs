@@ -25,6 +25,8 @@ mod tiff;
 #[cfg(feature = "webp")]
 mod webp;
 
+#[cfg(feature = "exr")]
+pub use self::exr::Layers;
 pub use model::{MODEL_SUFFIXES, write_model};
 pub(crate) use partial_file::PartialFile;
 pub use partial_file::remove_unfinished;
@@ -257,10 +259,10 @@ pub struct WriteError {
 #[non_exhaustive]
 pub enum WriteProblem {
     /// The suffix names no format that is written.
-    #[error("has no suffix of a picture; pictures are written as {0}")]
+    #[error("is of no format that is written; pictures are written as {0}")]
     UnknownSuffix(String),
     /// The suffix names no format of models that is written.
-    #[error("has no suffix of a model; models are written as {0}")]
+    #[error("is of no format that is written; models are written as {0}")]
     UnknownModelSuffix(String),
     /// The format has no such samples.
     #[error("a picture of that format is stored as {possible}, not as {asked}")]
@@ -271,7 +273,7 @@ pub enum WriteProblem {
         possible: String,
     },
     /// The operating system's word.
-    #[error("cannot be written: {0}")]
+    #[error("cannot be written: {}", crate::reason(.0))]
     Io(#[from] io::Error),
     /// The format cannot hold the picture.
     #[error("cannot hold the picture: {0}")]
@@ -304,13 +306,42 @@ pub fn write_picture_as(
     picture: &Picture,
     options: &PictureOptions,
 ) -> Result<(), WriteError> {
+    write_to(path, |writer| encode(writer, format, picture, options))
+}
+
+/// Writes a picture as an EXR with layers beside it, whatever the suffix says.
+///
+/// # Errors
+/// When the file cannot be written; then nothing has changed.
+#[cfg(feature = "exr")]
+pub fn write_layers(
+    path: &Path,
+    picture: &Picture,
+    layers: &Layers,
+    options: &PictureOptions,
+) -> Result<(), WriteError> {
+    write_to(path, |writer| {
+        encode_layers(writer, picture, layers, options)
+    })
+}
+
+/// What is written to, to be encoded into.
+trait Target: Write + Seek {}
+
+impl<T: Write + Seek> Target for T {}
+
+/// Writes what `encode` makes, in one step or, where a stream stands, as [`stream_picture`] does.
+fn write_to(
+    path: &Path,
+    encode: impl Fn(&mut dyn Target) -> Result<(), WriteProblem>,
+) -> Result<(), WriteError> {
     let write = || -> Result<(), WriteProblem> {
         if is_stream(path) {
             let mut stream = std::fs::File::options().write(true).open(path)?;
-            return stream_picture(&mut stream, format, picture, options);
+            return stream_to(&mut stream, encode);
         }
         let mut file = PartialFile::create(path)?;
-        encode(&mut file, format, picture, options)?;
+        encode(&mut file)?;
         Ok(file.finish()?)
     };
     write().map_err(|problem| WriteError {
@@ -330,8 +361,31 @@ pub fn stream_picture(
     picture: &Picture,
     options: &PictureOptions,
 ) -> Result<(), WriteProblem> {
+    stream_to(writer, |bytes| encode(bytes, format, picture, options))
+}
+
+/// [`write_layers`] to where there is no going back.
+///
+/// # Errors
+/// When it cannot be encoded or written.
+#[cfg(feature = "exr")]
+pub fn stream_layers(
+    writer: &mut impl Write,
+    picture: &Picture,
+    layers: &Layers,
+    options: &PictureOptions,
+) -> Result<(), WriteProblem> {
+    stream_to(writer, |bytes| {
+        encode_layers(bytes, picture, layers, options)
+    })
+}
+
+fn stream_to(
+    writer: &mut impl Write,
+    encode: impl Fn(&mut dyn Target) -> Result<(), WriteProblem>,
+) -> Result<(), WriteProblem> {
     let mut bytes = Cursor::new(Vec::new());
-    encode(&mut bytes, format, picture, options)?;
+    encode(&mut bytes)?;
     writer.write_all(bytes.get_ref())?;
     Ok(writer.flush()?)
 }
@@ -341,8 +395,19 @@ pub(crate) fn is_stream(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
+#[cfg(feature = "exr")]
+fn encode_layers(
+    mut writer: &mut dyn Target,
+    picture: &Picture,
+    layers: &Layers,
+    options: &PictureOptions,
+) -> Result<(), WriteProblem> {
+    let samples = options.samples_in(PictureFormat::Exr)?;
+    exr::write(&mut writer, picture, Some(layers), samples, options)
+}
+
 fn encode(
-    writer: &mut (impl Write + Seek),
+    mut writer: &mut dyn Target,
     format: PictureFormat,
     picture: &Picture,
     options: &PictureOptions,
@@ -358,6 +423,7 @@ fn encode(
             "its format ends at {most} pixels a side, and it has {width} x {height}; write .png"
         )));
     }
+    let writer = &mut writer;
     match format {
         #[cfg(feature = "png")]
         PictureFormat::Png => png::write(writer, picture, samples),
@@ -368,7 +434,7 @@ fn encode(
         #[cfg(feature = "webp")]
         PictureFormat::WebP => webp::write(writer, picture),
         #[cfg(feature = "exr")]
-        PictureFormat::Exr => exr::write(writer, picture, samples, options),
+        PictureFormat::Exr => exr::write(writer, picture, None, samples, options),
         PictureFormat::Pfm => pfm::write(writer, picture),
         PictureFormat::Npy => npy::write(writer, picture),
     }

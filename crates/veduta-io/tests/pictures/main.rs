@@ -1,6 +1,7 @@
 //! Picture files: what is written is read again, and damaged files are read or refused.
 
 mod damaged;
+mod layers;
 mod round_trips;
 
 use std::path::PathBuf;

@@ -234,7 +234,7 @@ fn what_is_missing_or_not_supported_is_warned_of_and_left_out() {
     let loaded = folder.read("m.obj", text).expect("a readable file");
     let texts: Vec<_> = loaded.warnings.iter().map(ToString::to_string).collect();
     for expected in [
-        "a.mtl:2: \"x\" where a number is expected; the line is left out",
+        "a.mtl:2: \"x\" where a number should stand; the line is left out",
         "a.mtl:3: the texture \"gone.png\" cannot be read",
         "m.obj:2: the material library \"gone.mtl\" cannot be read",
         "m.obj: no library has the material \"other\"",
@@ -258,15 +258,15 @@ fn wrong_lines_are_refused_with_their_number() {
         (
             "v 1 2\n",
             5,
-            "\"end of line\" where three numbers is expected",
+            "the line ends where three numbers should stand",
         ),
-        ("v 1 nan 2\n", 5, "\"nan\" where three numbers is expected"),
+        ("v 1 nan 2\n", 5, "\"nan\" where three numbers should stand"),
         (
             "v 1 1e999 2\n",
             5,
-            "\"1e999\" where three numbers is expected",
+            "\"1e999\" where three numbers should stand",
         ),
-        ("vt x\n", 5, "\"x\" where a number is expected"),
+        ("vt x\n", 5, "\"x\" where a number should stand"),
         ("f 1 2 5\n", 5, "refers to vertex 5, but 4 stand before it"),
         ("f 1 2 0\n", 5, "refers to vertex 0, but 4 stand before it"),
         (
@@ -287,7 +287,7 @@ fn wrong_lines_are_refused_with_their_number() {
         (
             "f 1 2 3.5\n",
             5,
-            "\"3.5\" where a corner such as 1, 1/2, 1//3 or 1/2/3 is expected",
+            "\"3.5\" where a corner such as 1, 1/2, 1//3 or 1/2/3 should stand",
         ),
         ("f 1 2 /3\n", 5, "\"/3\" where a corner"),
         (

@@ -270,7 +270,7 @@ fn wrong_files_are_refused_with_the_place() {
         ),
         (
             faces("3 0 1 2\n3 0 x 1\n").into(),
-            "m.ply:15: \"x\" where a number is expected",
+            "m.ply:15: \"x\" where a number should stand",
         ),
         (
             faces("3 0 1 2\n3 0 2\n").into(),

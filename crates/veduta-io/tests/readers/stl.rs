@@ -135,7 +135,7 @@ fn wrong_files_are_refused_with_the_place() {
         ),
         (
             whole.replace("vertex 1e0 0 0.000", "vertex 1 0").into(),
-            "m.stl:6: \"end of line\" where three numbers is expected",
+            "m.stl:6: the line ends where three numbers should stand",
         ),
         (
             whole.replacen("vertex", "vortex", 1).into(),
@@ -151,7 +151,7 @@ fn wrong_files_are_refused_with_the_place() {
         ),
         (
             (whole.clone() + "facet").into(),
-            "\"facet\" where solid is expected",
+            "\"facet\" where solid should stand",
         ),
         (
             whole.replacen("1e0", "nan", 1).into(),

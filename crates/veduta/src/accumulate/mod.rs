@@ -3,11 +3,17 @@
 //! The box filter: a pixel is the sum over its parts of area times radiance. It is exact wherever
 //! radiance is constant over a part.
 //!
-//! [`DeepFilter`] keeps of each face in a pixel a sample of its own, with its depth.
+//! [`DeepFilter`] keeps of each face in a pixel a sample of its own, with its depth. Beside the light,
+//! what a picture tells of its pixels otherwise ([`Aovs`]), of which the areas of things ([`rank`]) are
+//! summed up here.
 
+mod aovs;
 mod deep;
+mod matte;
 
+pub use aovs::{AovSettings, Aovs};
 pub use deep::{DeepFilter, DeepRows, DeepSample};
+pub use matte::{Matte, Rank, rank};
 
 use crate::dice::Parts;
 use crate::shade::Radiance;

@@ -12,20 +12,23 @@
 //! 2. [`dice`] walks the fragments of a band in order, so that the parts of a pixel always come in
 //!    the order of fragments and sums over them are the same in every run.
 //!
-//! [`dice_spans`] does the same for what multiscan found. [`coverage`] gives the areas in f64, for measuring;
-//! [`Depths`] how deep parts reach, for deep pictures.
+//! [`dice_spans`] does the same for what multiscan found. [`sum_by_face`] tells which faces a pixel
+//! shows, for all that is not light. [`coverage`] gives the areas in f64, for measuring; [`Depths`] how
+//! deep parts reach, for deep pictures.
 
 mod bands;
 mod coverage;
 mod depth;
 mod pixel_grid;
 mod place;
+mod shares;
 mod spans;
 
 pub use bands::{BAND_ROWS, Bands};
 pub use coverage::{Coverage, coverage};
 pub use depth::{DepthRange, Depths, depth_of_nearness};
 pub use pixel_grid::PixelGrid;
+pub use shares::{Share, largest, sum_by_face};
 pub use spans::{SpanDicer, dice_spans};
 
 use place::Placer;

@@ -10,12 +10,17 @@
 //!    ready for evaluation anywhere (`surface.rs`).
 //! 3. [`Surfaces::shade`] evaluates the parts of a band.
 //!
+//! [`Points`] tells of a face what is not light: where its points are, and how they are turned.
+//!
 //! The light is a stand-in, a sun and a plain sky ([`light`]); those of the scene
 //! ([`Scene::lights`]) are not looked at. Nor is opacity: all that is diced is opaque.
 
 pub mod light;
+mod points;
 mod surface;
 mod texture;
+
+pub use points::Points;
 
 use crate::dice::{Parts, PixelGrid};
 use crate::scene::{ImageId, Material, Scene, TextureRef};
@@ -106,11 +111,12 @@ impl<'a> Surfaces<'a> {
         light: Daylight,
         unlit: bool,
     ) -> Self {
-        let viewer = Viewer::new(scene, camera, faces, &light, unlit);
+        let viewer = Viewer::new(scene, camera, faces);
+        let shining = (!unlit).then_some(&light);
         let mut surfaces: Vec<Surface> = shown
             .par_iter()
             .with_min_len(256)
-            .map(|&face| match viewer.constant(face) {
+            .map(|&face| match viewer.constant(face, shining) {
                 Some(radiance) => Surface::Constant(radiance),
                 None => Surface::Varying(0),
             })

@@ -1,6 +1,6 @@
 //! What a face looks like from the eye, made ready for evaluation at any point of it.
 
-use crate::scene::{Material, Scene, TextureRef};
+use crate::scene::{Scene, TextureRef};
 use crate::shade::light::Daylight;
 use crate::shade::texture::picture_from_uv;
 use veduta_geometry::{DMat3, DMat4, DVec2, DVec3, Vec3};
@@ -117,8 +117,6 @@ pub struct Viewer<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
     faces: &'a Faces,
-    light: &'a Daylight,
-    unlit: bool,
     world_from_eye: DMat3,
     objects: Vec<ObjectView>,
 }
@@ -130,13 +128,7 @@ struct ObjectView {
 }
 
 impl<'a> Viewer<'a> {
-    pub fn new(
-        scene: &'a Scene,
-        camera: &'a Camera,
-        faces: &'a Faces,
-        light: &'a Daylight,
-        unlit: bool,
-    ) -> Self {
+    pub fn new(scene: &'a Scene, camera: &'a Camera, faces: &'a Faces) -> Self {
         let eye_from_world = camera.eye_from_world;
         let view = |object: &crate::scene::Object| ObjectView {
             eye_from_object: eye_from_world * object.world_from_object,
@@ -148,49 +140,49 @@ impl<'a> Viewer<'a> {
             scene,
             camera,
             faces,
-            light,
-            unlit,
             world_from_eye: DMat3::from_mat4(eye_from_world).transpose(),
             objects: scene.objects.iter().map(view).collect(),
         }
     }
 
-    fn lit(&self, material: &Material) -> bool {
-        !(self.unlit || material.unlit)
-    }
-
-    /// The face's radiance if it is the same everywhere.
-    pub fn constant(&self, face: FaceId) -> Option<[f32; 3]> {
+    /// The face's radiance in that light, or without `light` its colour, if it is the same everywhere.
+    pub fn constant(&self, face: FaceId, light: Option<&Daylight>) -> Option<[f32; 3]> {
         let (object, source) = (self.faces.object(face), self.faces.source(face));
         let mesh = self.scene.mesh_of(object);
         let material = self.scene.material_of(object, source);
-        let lit = self.lit(material);
-        let emissive_texture = material.emissive_texture.filter(|_| lit);
+        let light = light.filter(|_| !material.unlit);
+        let emissive_texture = material.emissive_texture.filter(|_| light.is_some());
         let textures = [material.base_color_texture, emissive_texture];
         let placed = |texture: &TextureRef| !mesh.texcoords_of(texture.texcoords).is_empty();
         if textures.iter().flatten().any(placed) {
             return None;
         }
-        let triangles = mesh.triangles_of(source);
-        let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
         let [r, g, b, _] = material.base_color;
         let mut color = Vec3::new(r, g, b);
         if !mesh.colors.is_empty() {
+            let corners = self.corners(object, source);
             color *= Vec3::from(all_equal(corners.map(|corner| mesh.colors[corner]))?);
         }
-        if !lit {
+        let Some(light) = light else {
             return Some(color.into());
-        }
-        let face_normal = self.face_normal(&self.eye_corners(object, source));
-        let normal = if mesh.normals.is_empty() {
-            face_normal
-        } else {
-            let normal = all_equal(corners.map(|corner| mesh.normals[corner]))?;
-            let turned = self.objects[object.index()].world_normal_from_object * normal.as_dvec3();
-            on_side_of(turned.as_vec3(), face_normal)
         };
-        let radiance = color * self.light.on(normal) + Vec3::from(material.emissive);
+        let normal = self.constant_normal(face)?;
+        let radiance = color * light.on(normal) + Vec3::from(material.emissive);
         Some(radiance.into())
+    }
+
+    /// The face's unit normal in world space, on the eye's side, if it is the same everywhere.
+    pub fn constant_normal(&self, face: FaceId) -> Option<Vec3> {
+        let (object, source) = (self.faces.object(face), self.faces.source(face));
+        let mesh = self.scene.mesh_of(object);
+        let face_normal = |viewer: &Self| viewer.face_normal(&viewer.eye_corners(object, source));
+        if mesh.normals.is_empty() {
+            return Some(face_normal(self));
+        }
+        let corners = self.corners(object, source);
+        let normal = all_equal(corners.map(|corner| mesh.normals[corner]))?;
+        let turned = self.objects[object.index()].world_normal_from_object * normal.as_dvec3();
+        Some(on_side_of(turned.as_vec3(), face_normal(self)))
     }
 
     /// The face made ready for evaluation from point to point.
@@ -199,8 +191,8 @@ impl<'a> Viewer<'a> {
         let mesh = self.scene.mesh_of(object);
         let material = mesh.material_of(source);
         let textures = self.scene.material(material);
-        let triangles = mesh.triangles_of(source);
-        let corners = mesh.triangles[triangles.start].map(|corner| corner as usize);
+        let is_triangle = mesh.triangles_of(source).len() == 1;
+        let corners = self.corners(object, source);
         let eye_corners = self.eye_corners(object, source);
         let turn = &self.objects[object.index()].world_normal_from_object;
         let has = |rows: usize| (rows > 0).then_some(corners);
@@ -212,7 +204,7 @@ impl<'a> Viewer<'a> {
         };
         Varying {
             material,
-            corners: Corners::new(self.camera, eye_corners, triangles.len() == 1),
+            corners: Corners::new(self.camera, eye_corners, is_triangle),
             face_normal: self.face_normal(&eye_corners),
             normals: has(mesh.normals.len()).map(|corners| {
                 // Normalised here: an object scaled unequally would weigh its corners otherwise.
@@ -229,12 +221,18 @@ impl<'a> Viewer<'a> {
         }
     }
 
-    /// Corners of the face that span it: all three of a triangle.
+    /// Corners of the face that span it, all three of a triangle: rows of its mesh.
+    fn corners(&self, object: ObjectId, source: u32) -> [usize; 3] {
+        let mesh = self.scene.mesh_of(object);
+        mesh.triangles[mesh.triangles_of(source).start].map(|corner| corner as usize)
+    }
+
+    /// Those corners in eye space.
     fn eye_corners(&self, object: ObjectId, source: u32) -> [DVec3; 3] {
         let mesh = self.scene.mesh_of(object);
         let eye_from_object = &self.objects[object.index()].eye_from_object;
-        mesh.triangles[mesh.triangles_of(source).start]
-            .map(|corner| eye_from_object.transform_point3(mesh.positions[corner as usize]))
+        self.corners(object, source)
+            .map(|corner| eye_from_object.transform_point3(mesh.positions[corner]))
     }
 
     /// Unit normal of a face in world space, on the eye's side.
@@ -288,14 +286,25 @@ impl Varying {
             }
         };
         SurfacePoint {
-            normal: match self.normals {
-                Some(normals) => on_side_of(mean(normals), self.face_normal),
-                None => self.face_normal,
-            },
+            normal: self.normal_of([w0, w1, w2]),
             color: self.colors.map_or(Vec3::ONE, mean),
             picture: self.picture.as_ref().map(place),
             emissive_picture: self.emissive_picture.as_deref().map(place),
         }
+    }
+
+    /// The normal alone of [`Varying::at`].
+    pub fn normal_at(&self, image: DVec2) -> Vec3 {
+        self.normal_of(self.corners.at(image).0)
+    }
+
+    /// The normal at barycentric coordinates.
+    #[inline]
+    fn normal_of(&self, [w0, w1, w2]: [f64; 3]) -> Vec3 {
+        self.normals.map_or(self.face_normal, |[a, b, c]| {
+            let mean = a * w0 as f32 + b * w1 as f32 + c * w2 as f32;
+            on_side_of(mean, self.face_normal)
+        })
     }
 }
 

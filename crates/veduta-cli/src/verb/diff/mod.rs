@@ -72,7 +72,7 @@ impl Diff {
         let found = Differences::of(&a.picture, &b.picture, space, self.tolerance);
         if let Some(target) = &target {
             talk.begin("writing");
-            target.write(&compare::heat(&a.picture, &b.picture, space))?;
+            target.write(&compare::heat(&a.picture, &b.picture, space), None)?;
         }
         talk.end();
         print(&if json {

@@ -10,7 +10,7 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use veduta::scene::{Scene, generate};
-use veduta_io::write_model;
+use veduta_io::{closest_name, write_model};
 
 /// List the example scenes, or write one as a model
 ///
@@ -90,7 +90,12 @@ impl Examples {
             None => PathBuf::from(format!("{name}.glb")),
         };
         if !SCENES.iter().any(|(known, _)| known == name) {
-            let message = format!("no example {name:?}; veduta examples lists them");
+            let names = SCENES.iter().map(|&(name, _)| name);
+            let meant = closest_name(name, names).map(|name| format!("did you mean {name:?}? "));
+            let message = format!(
+                "no example {name:?}; {}veduta examples lists them",
+                meant.unwrap_or_default()
+            );
             return Err(Failure::new(Code::Usage, message));
         }
         super::output::refuse_output_nowhere(&output)?;

@@ -1,5 +1,6 @@
 //! `veduta info`: what a model or a picture holds, and what a camera sees at a point of a picture.
 
+mod lights;
 mod model;
 mod pick;
 mod tree;
@@ -188,6 +189,7 @@ fn picture_told(loaded: &LoadedPicture) -> (Value, String) {
     let json = json!({
         "size": [picture.width, picture.height],
         "stored": stored,
+        "furtherChannels": loaded.further_channels,
         "min": (finite > 0.0).then_some(low),
         "max": (finite > 0.0).then_some(high),
         "mean": (finite > 0.0).then_some(mean),
@@ -197,6 +199,14 @@ fn picture_told(loaded: &LoadedPicture) -> (Value, String) {
         "  size      {} x {} pixels\n  stored    {stored}\n",
         picture.width, picture.height
     );
+    if !loaded.further_channels.is_empty() {
+        let names: Vec<_> = loaded
+            .further_channels
+            .iter()
+            .map(|name| plain(name))
+            .collect();
+        text += &format!("  beside    {}\n", names.join(", "));
+    }
     if finite > 0.0 {
         text += "  linear light, premultiplied     min         mean          max\n";
         for (k, name) in ["red", "green", "blue", "opacity"].into_iter().enumerate() {

@@ -1,11 +1,11 @@
 //! What a model holds.
 
-use super::tree;
+use super::{lights, tree};
 use crate::talk::{grouped, plain};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use veduta::map::{Camera, Projection};
-use veduta::scene::{AlphaMode, Bounds, LightKind, Material, Scene};
+use veduta::scene::{AlphaMode, Bounds, Image, Material, Scene, TextureRef};
 
 pub fn as_json(scene: &Scene) -> Value {
     let objects: Vec<_> = scene
@@ -19,11 +19,7 @@ pub fn as_json(scene: &Scene) -> Value {
         .iter()
         .map(|(name, camera)| camera_as_json(name, camera))
         .collect();
-    let lights: Vec<_> = scene
-        .lights
-        .iter()
-        .map(|light| json!({ "name": light.name, "kind": kind_of_light(light.kind) }))
-        .collect();
+    let lights: Vec<_> = scene.lights.iter().map(lights::as_json).collect();
     let layers: Vec<_> = scene
         .layers
         .iter()
@@ -36,13 +32,13 @@ pub fn as_json(scene: &Scene) -> Value {
         .materials
         .iter()
         .map(|material| {
-            let image = material
-                .base_color_texture
-                .map(|t| &scene.images[t.image.0 as usize]);
+            let name_of = |texture: Option<TextureRef>| Some(&image_of(scene, texture?).name);
             json!({
                 "name": material.name,
                 "color": material.base_color,
-                "texture": image.map(|image| &image.name),
+                "texture": name_of(material.base_color_texture),
+                "emissive": material.emissive,
+                "emissiveTexture": name_of(material.emissive_texture),
                 "opacity": opacity(material),
                 "doubleSided": material.double_sided,
                 "unlit": material.unlit,
@@ -109,12 +105,9 @@ fn opacity(material: &Material) -> &'static str {
     }
 }
 
-fn kind_of_light(kind: LightKind) -> &'static str {
-    match kind {
-        LightKind::Directional { .. } => "directional",
-        LightKind::Point { .. } => "point",
-        LightKind::Spot { .. } => "spot",
-    }
+/// The picture that a texture lays on a surface.
+fn image_of(scene: &Scene, texture: TextureRef) -> &Image {
+    &scene.images[texture.image.0 as usize]
 }
 
 pub fn as_text(scene: &Scene, all: bool) -> String {
@@ -180,14 +173,19 @@ fn write_text(scene: &Scene, all: bool, text: &mut String) -> std::fmt::Result {
             "    {name}  colour {r:.3} {g:.3} {b:.3} {a:.3}, {}",
             opacity(material)
         )?;
-        if let Some(texture) = material.base_color_texture {
-            let image = &scene.images[texture.image.0 as usize];
-            let name = plain(&image.name);
-            write!(
-                text,
-                ", texture {name} ({} x {})",
-                image.width, image.height
-            )?;
+        let write_texture = |texture: Option<TextureRef>, text: &mut String| match texture {
+            Some(texture) => {
+                let image = image_of(scene, texture);
+                let (name, width, height) = (plain(&image.name), image.width, image.height);
+                write!(text, ", texture {name} ({width} x {height})")
+            }
+            None => Ok(()),
+        };
+        write_texture(material.base_color_texture, text)?;
+        if material.emissive != [0.0; 3] {
+            let [r, g, b] = material.emissive;
+            write!(text, "; emits {r:.3} {g:.3} {b:.3}")?;
+            write_texture(material.emissive_texture, text)?;
         }
         writeln!(text)?;
     }
@@ -201,12 +199,7 @@ fn write_text(scene: &Scene, all: bool, text: &mut String) -> std::fmt::Result {
     if !scene.lights.is_empty() {
         writeln!(text, "  lights    {}", scene.lights.len())?;
         for light in &scene.lights {
-            writeln!(
-                text,
-                "    {}  {}",
-                plain(&light.name),
-                kind_of_light(light.kind)
-            )?;
+            lights::write(light, text)?;
         }
     }
     writeln!(text, "  cameras   {}", scene.cameras.len())?;

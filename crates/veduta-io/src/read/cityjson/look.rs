@@ -203,7 +203,7 @@ impl<'a> Look<'a> {
             Err("is not a path to a file; download it and put it beside the model".into())
         } else {
             read_whole(&self.folder.join(name))
-                .map_err(|error| format!("cannot be read: {error}"))
+                .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
                 .and_then(|bytes| self.decoder.decode(name, &bytes))
         };
         let image = match decoded {

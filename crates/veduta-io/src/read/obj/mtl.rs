@@ -68,7 +68,8 @@ impl<'a> Library<'a> {
             }
             Err(error) => {
                 let message = format!(
-                    "the material library {names:?} cannot be read: {error}; plain colours are shown"
+                    "the material library {names:?} cannot be read: {}; plain colours are shown",
+                    crate::reason(&error)
                 );
                 warnings.add(Place::Line(line), message);
             }
@@ -152,7 +153,7 @@ impl<'a> Library<'a> {
             Some(&known) => known,
             None => {
                 let decoded = find(self.folder, &map.name)
-                    .map_err(|error| format!("cannot be read: {error}"))
+                    .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
                     .and_then(|(_, bytes)| self.decoder.decode(&map.name, &bytes));
                 let image = match decoded {
                     Ok(image) => {

@@ -59,7 +59,7 @@ pub(crate) fn read(
         .filter(|_| !mesh.texcoords.is_empty())
     {
         let decoded = read_whole(&path.parent().unwrap_or(Path::new("")).join(texture))
-            .map_err(|error| format!("cannot be read: {error}"))
+            .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
             .and_then(|bytes| PictureDecoder::new().decode(texture, &bytes));
         match decoded {
             Ok(image) => {

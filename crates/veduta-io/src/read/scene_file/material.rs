@@ -199,7 +199,7 @@ impl Pictures {
             return Ok(known);
         }
         let decoded = read_whole(&path)
-            .map_err(|error| format!("cannot be read: {error}"))
+            .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
             .and_then(|bytes| {
                 inclusion.add_input(&path, bytes.len());
                 self.decoder.decode(named, &bytes)

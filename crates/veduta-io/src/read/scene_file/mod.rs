@@ -24,7 +24,7 @@ mod source;
 mod value;
 
 use super::error::{Place, Problem, ReadError, Warning, Warnings};
-use super::names::closest;
+use super::names::neighbour;
 use super::{Loaded, ReadOptions, files, finish};
 use document::{Changes, Document};
 use form::{Form, Node};
@@ -171,7 +171,7 @@ fn read_form<F: Form>(name: &'static str, source: &Source<'_>) -> Result<F, Read
     let (table, errors) = DeTable::parse_recoverable(source.text);
     for error in errors {
         let span = error.span().unwrap_or(0..0);
-        faults.add(span, Problem::Toml(error.message().to_owned()));
+        faults.add(span, Problem::Toml(with_hint(error.message())));
     }
     faults.finish(source)?;
 
@@ -180,6 +180,16 @@ fn read_form<F: Form>(name: &'static str, source: &Source<'_>) -> Result<F, Read
     let form = F::read(name, &root, &mut faults);
     faults.finish(source)?;
     Ok(form.expect("a form without faults can be read"))
+}
+
+/// What the parser says, and what most often leads to it.
+fn with_hint(message: &str) -> String {
+    let hint = if message.starts_with("invalid float") || message.starts_with("invalid integer") {
+        "; a value with a unit stands in quotes, such as \"40deg\""
+    } else {
+        ""
+    };
+    format!("{message}{hint}")
 }
 
 /// The path of a file that a scene file names, if it is there and may be read.
@@ -191,29 +201,10 @@ fn find_file(scene_file: &Path, named: &str) -> Result<PathBuf, Problem> {
     let mut reason = match std::fs::metadata(&path) {
         Ok(metadata) if metadata.is_file() => return Ok(path),
         Ok(_) => "it is not a plain file".to_owned(),
-        Err(error) => error.to_string(),
+        Err(error) => crate::reason(&error),
     };
     if let Some(name) = neighbour(&path) {
         reason += &format!("; did you mean {name:?}?");
     }
     Err(Problem::NoFile { path, reason })
-}
-
-/// The name of a file in the same folder that may be meant.
-fn neighbour(path: &Path) -> Option<String> {
-    /// A folder with more is no place to guess in.
-    const MOST: usize = 1000;
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let entries = std::fs::read_dir(folder).ok()?.take(MOST);
-    let mut names: Vec<String> = entries
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .collect();
-    names.sort();
-    let found = path.file_name()?.to_str()?;
-    closest(found, names.iter().map(String::as_str))
-        .filter(|name| *name != found)
-        .map(str::to_owned)
 }
