@@ -44,3 +44,7 @@ pub use write::{
     WriteError, WriteProblem, remove_unfinished, stream_picture, write_model, write_picture,
     write_picture_as,
 };
+#[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
+pub use write::{
+    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
+};

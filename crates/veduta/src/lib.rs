@@ -10,6 +10,7 @@
 pub mod accumulate;
 mod buckets;
 pub mod dice;
+pub mod drawing;
 pub mod pipeline;
 pub mod scene;
 pub mod shade;

@@ -10,6 +10,7 @@ pub mod man;
 mod output;
 pub mod render;
 pub mod schema;
+mod vector;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;

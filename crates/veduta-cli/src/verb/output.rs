@@ -1,5 +1,6 @@
 //! Where a picture goes, and as what.
 
+use super::vector::VectorTarget;
 use crate::exit::{Code, Failure};
 use crate::preview::Style;
 use crate::values::Size;
@@ -8,8 +9,8 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
 use veduta_io::{
-    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
-    stream_picture, write_picture_as,
+    ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, VECTOR_SUFFIXES,
+    VectorFormat, WriteProblem, stream_picture, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -19,9 +20,9 @@ pub struct Output {
     /// The picture; its suffix chooses the format. - writes to stdout, as .png or as --format says
     #[arg(short, long, value_name = "FILE", required_unless_present = "preview")]
     output: Option<PathBuf>,
-    /// The format, whatever the suffix: png, jpg, tif, webp, exr, pfm or npy
+    /// The format, whatever the suffix: png, jpg, tif, webp, exr, pfm, npy, svg, pdf or geojson
     #[arg(long, value_name = "FORMAT", value_parser = format, requires = "output")]
-    format: Option<PictureFormat>,
+    format: Option<Format>,
     /// Bits of a channel: 8, 16, half or float. 8 by default for .png and .tif, float for .exr
     #[arg(long, value_name = "BITS", requires = "output")]
     depth: Option<DepthArgument>,
@@ -76,9 +77,17 @@ enum CompressionArgument {
 }
 
 /// `--format`
-fn format(name: &str) -> Result<PictureFormat, String> {
-    PictureFormat::of_suffix(name)
-        .ok_or_else(|| format!("expected one of {}", PICTURE_SUFFIXES.join(", ")))
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Pixels(PictureFormat),
+    Vector(VectorFormat),
+}
+
+fn format(name: &str) -> Result<Format, String> {
+    let pixels = PictureFormat::of_suffix(name).map(Format::Pixels);
+    let format = pixels.or_else(|| VectorFormat::of_suffix(name).map(Format::Vector));
+    let known = [PICTURE_SUFFIXES, VECTOR_SUFFIXES].concat().join(", ");
+    format.ok_or_else(|| format!("expected one of {known}"))
 }
 
 /// A place for a picture, checked as far as it can be before there is one.
@@ -91,20 +100,46 @@ pub struct Target {
     pub linear: bool,
 }
 
+/// Where a picture goes.
 #[derive(Debug)]
-enum Place {
+pub enum Place {
     Stdout,
     File(PathBuf),
 }
 
 impl Output {
-    /// The place asked for, if one is.
-    pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
+    /// The place for a vector picture, if one is asked for.
+    pub fn vector_target(&self, json: bool) -> Result<Option<VectorTarget>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);
         };
+        let format = match self.format {
+            Some(Format::Vector(format)) => Some(format),
+            Some(Format::Pixels(_)) => None,
+            None => VectorFormat::of(output),
+        };
+        let Some(format) = format else {
+            return Ok(None);
+        };
+        let for_pixels = [
+            (self.depth.is_some(), "--depth"),
+            (self.quality.is_some(), "--quality"),
+            (self.compression.is_some(), "--compression"),
+            (self.tile.is_some(), "--tile"),
+            (self.preview.is_some(), "--preview"),
+        ];
+        if let Some((_, option)) = for_pixels.into_iter().find(|(is_given, _)| *is_given) {
+            let message = format!("{option} is for pictures of pixels, not for vector pictures");
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let place = self.place(output, json)?;
+        Ok(Some(VectorTarget { place, format }))
+    }
+
+    /// Where `output` leads.
+    fn place(&self, output: &Path, json: bool) -> Result<Place, Failure> {
         let usage = |message: String| Err(Failure::new(Code::Usage, message));
-        let place = if output.as_os_str() == "-" {
+        if output.as_os_str() == "-" {
             if json {
                 return usage("-o - and --json both write to stdout; leave one out".into());
             }
@@ -118,13 +153,25 @@ impl Output {
                         .into(),
                 );
             }
-            Place::Stdout
+            Ok(Place::Stdout)
         } else {
             refuse_output_nowhere(output)?;
-            Place::File(output.clone())
+            Ok(Place::File(output.to_owned()))
+        }
+    }
+
+    /// The place for a picture of pixels, if one is asked for.
+    pub fn target(&self, json: bool) -> Result<Option<Target>, Failure> {
+        let Some(output) = &self.output else {
+            return Ok(None);
         };
+        let usage = |message: String| Err(Failure::new(Code::Usage, message));
+        let place = self.place(output, json)?;
         let format = match (self.format, &place) {
-            (Some(format), _) => format,
+            (Some(Format::Pixels(format)), _) => format,
+            (Some(Format::Vector(_)), _) => {
+                return usage("this verb makes pictures of pixels only".into());
+            }
             (None, Place::Stdout) => PictureFormat::Png,
             (None, Place::File(path)) => PictureFormat::of(path)?,
         };
@@ -218,9 +265,16 @@ impl Target {
 
     /// The name to tell.
     pub fn name(&self) -> String {
-        match &self.place {
-            Place::Stdout => "-".to_owned(),
-            Place::File(path) => path.to_string_lossy().into_owned(),
+        self.place.name()
+    }
+}
+
+impl Place {
+    /// The name to tell.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Stdout => "-".to_owned(),
+            Self::File(path) => path.to_string_lossy().into_owned(),
         }
     }
 }

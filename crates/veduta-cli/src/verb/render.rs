@@ -1,5 +1,6 @@
 use super::look::Look;
 use super::output::Output;
+use super::vector::{Vector, VectorTarget};
 use super::{Reading, load, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
@@ -7,6 +8,8 @@ use crate::talk::{Talk, print, print_bytes};
 use crate::values::{self, FieldOfView, Size};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use veduta::accumulate::Picture;
+use veduta::drawing::{Drawing, Evenness, Shape};
 use veduta::map::{Camera, Projection};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
@@ -20,6 +23,10 @@ use veduta_io::{Loaded, scaled};
 ///
 /// Pictures for a display (.png, .jpg, .webp, .tif of 8 or 16 bits) are exposed and toned unless told;
 /// those for further work (.exr, .pfm, .npy, .tif of floats) are linear and left as they are.
+///
+/// Vector pictures (.svg, .pdf, .geojson) have one shape for neighbouring faces in one plane that look
+/// alike, named as their objects are, without seams. A shape has one colour: the mean, where it has a
+/// texture, smooth normals or colours at its corners. Lines are visible edges; hidden ones are not drawn.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Render {
@@ -44,6 +51,8 @@ pub struct Render {
     view: View,
     #[command(flatten)]
     look: Look,
+    #[command(flatten)]
+    vector: Vector,
 }
 
 const EXAMPLES: &str = "\
@@ -56,6 +65,10 @@ Examples:
       veduta render town.obj -o plan.tif --depth 16 --eye 0,0,100 --parallel 120
   Linear light for compositing, in tiles of half floats:
       veduta render town.obj -o town.exr --depth half --tile 64
+  A drawing for print, with lines of a quarter of a millimetre:
+      veduta render town.obj -o town.pdf --lines silhouette,crease --line-width 0.25mm
+  Lines only, for an illustration:
+      veduta render part.glb -o part.svg --fill none --lines silhouette,crease,boundary
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -98,6 +111,10 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if let Some(target) = self.output.vector_target(json)? {
+            return self.draw(&target, json, talk);
+        }
+        self.vector.refuse()?;
         let target = self.output.target(json)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
@@ -181,6 +198,97 @@ impl Render {
         Ok(())
     }
 
+    /// Makes a vector picture.
+    fn draw(&self, target: &VectorTarget, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if self.sampling != Sampling::Exact {
+            let message = "a vector picture is made of exact regions; leave --sampling out";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let what = self.vector.drawing(target.format)?;
+        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
+        let development = self.look.development(&scene, self.strict, talk)?;
+        let background = development.plain_background()?;
+        let settings = RenderSettings {
+            width: size.width,
+            height: size.height,
+            sampling: Sampling::Exact,
+            unlit: self.look.unlit,
+        };
+        talk.begin("finding visibility");
+        let map = pipeline::find_visibility(&scene, &camera);
+        let shortcomings = pipeline::shortcomings(&scene, &map);
+        self.tell_shortcomings(&scene, &shortcomings, talk)?;
+        talk.begin("drawing");
+        let mut drawing = pipeline::draw_map(&scene, &map, &settings, &what);
+        let mut ev = 0.0;
+        if what.shapes {
+            self.tell_means(&drawing, talk)?;
+            // Exposed as the picture of pixels would be: automatic exposure looks at those.
+            talk.begin("developing");
+            let mut picture = pipeline::render_map(&scene, &map, &settings);
+            ev = development.develop(&mut picture, true);
+            let mut colors = picture_of_colors(&drawing);
+            development.develop_at(&mut colors, ev, true);
+            for (shape, &[r, g, b, _]) in drawing.shapes.iter_mut().zip(&colors.pixels) {
+                shape.radiance = [r, g, b];
+            }
+        }
+        talk.begin("writing");
+        let title = self.model.file_name().unwrap_or_default().to_string_lossy();
+        let options = self.vector.options(title.into_owned(), background);
+        target.write(&drawing, &options)?;
+        talk.end();
+        talk.detail(format_args!(
+            "{} faces seen in {} fragments, {} shapes, {} lines, exposure {ev:.2} EV",
+            drawing
+                .shapes
+                .iter()
+                .map(|shape| shape.faces)
+                .sum::<usize>(),
+            map.opaque.len(),
+            drawing.shapes.len(),
+            drawing.strokes.len()
+        ));
+        if json {
+            let told = serde_json::json!({
+                "output": target.place.name(),
+                "size": [size.width, size.height],
+                "faces": scene.face_count(),
+                "fragments": map.opaque.len(),
+                "shapes": drawing.shapes.len(),
+                "mean_shapes": uneven_shapes(&drawing),
+                "lines": drawing.strokes.len(),
+                "exposure": ev,
+                "warnings": talk.warnings(),
+            });
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// Warns of shapes that have more than one colour; if strict, fails.
+    fn tell_means(&self, drawing: &Drawing, talk: &mut Talk) -> Result<(), Failure> {
+        let uneven = uneven_shapes(drawing);
+        if uneven == 0 {
+            return Ok(());
+        }
+        let message = format!(
+            "{}: {uneven} of {} shapes have the mean of their colours, which differ from point to \
+             point (textures, smooth normals, colours at corners)",
+            self.model.display(),
+            drawing.shapes.len()
+        );
+        if self.strict {
+            let message = format!("{message} (an error because of --strict)");
+            return Err(Failure::new(Code::Unsupported, message));
+        }
+        talk.warn(message);
+        Ok(())
+    }
+
     /// Leaves out all layers but those asked for.
     fn keep_layers(&self, scene: &mut Scene) -> Result<(), Failure> {
         if self.layer.is_empty() {
@@ -227,6 +335,28 @@ impl Render {
             talk.warn(message);
         }
         Ok(())
+    }
+}
+
+/// How many shapes have the mean of several colours.
+fn uneven_shapes(drawing: &Drawing) -> usize {
+    let uneven = drawing
+        .shapes
+        .iter()
+        .filter(|shape| shape.evenness != Evenness::Even);
+    uneven.count()
+}
+
+/// A pixel for each shape, so that their colours are developed as those of pictures are.
+fn picture_of_colors(drawing: &Drawing) -> Picture {
+    let pixel = |shape: &Shape| {
+        let [r, g, b] = shape.radiance;
+        [r, g, b, 1.0]
+    };
+    Picture {
+        width: drawing.shapes.len() as u32,
+        height: 1,
+        pixels: drawing.shapes.iter().map(pixel).collect(),
     }
 }
 

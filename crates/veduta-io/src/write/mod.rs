@@ -22,11 +22,17 @@ mod pfm;
 mod png;
 #[cfg(feature = "tiff")]
 mod tiff;
+#[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
+mod vector;
 #[cfg(feature = "webp")]
 mod webp;
 
 pub use model::{MODEL_SUFFIXES, write_model};
 pub use partial_file::remove_unfinished;
+#[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
+pub use vector::{
+    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
+};
 
 use partial_file::PartialFile;
 use std::fmt;
