@@ -138,7 +138,7 @@ pub struct Shape {
     /// Where it is seen: outlines wound positively and holes the other way, none of which cross.
     pub seen: Vec<Vec<DVec2>>,
     /// What is to be painted: `seen`, and a little under the shapes that are painted later. To be filled
-    /// where the winding number is not zero.
+    /// where the winding number is not zero. Nothing, if it is too thin to be seen.
     pub painted: Vec<Vec<DVec2>>,
     /// Depth of its nearest point: metres from the eye's plane, along the direction in which it looks.
     pub nearest: f64,
@@ -221,24 +221,63 @@ fn shapes(
             rank[fragment as usize] = place;
         }
     }
+    let outlines: Vec<Outlines> = order
+        .par_iter()
+        .map(|&region| outlines(subdivision, &rank, &regions[region as usize], grid))
+        .collect();
+    for (outlines, &region) in outlines.iter().zip(&order) {
+        if outlines.is_unseen() {
+            for &fragment in &regions[region as usize].fragments {
+                rank[fragment as usize] = u32::MAX;
+            }
+        }
+    }
     let trapper = Trapper::new(subdivision, &rank, grid, trap);
-    let shapes = order.par_iter().zip(&group_of).map(|(&region, &group)| {
+    let shapes = outlines.into_par_iter().zip(&order).zip(&group_of);
+    let shapes = shapes.map(|((outlines, &region), &group)| {
+        let painted = if outlines.is_unseen() {
+            Vec::new()
+        } else {
+            trapper.with_trap(&outlines.loops, &outlines.seen)
+        };
         let region = &regions[region as usize];
-        let border = border(subdivision, &rank, region);
-        let loops = trace::loops(subdivision, &border);
-        let seen: Vec<Vec<DVec2>> = loops
-            .iter()
-            .filter_map(|edges| {
-                let points: Vec<DVec2> = edges.iter().map(|&e| subdivision.ends(e)[0]).collect();
-                let corners = trace::corners(&points, COINCIDENT);
-                let in_pixels = |&corner: &usize| grid.pixels_from_image(points[corner]);
-                (!corners.is_empty()).then(|| corners.iter().map(in_pixels).collect())
-            })
-            .collect();
-        let painted = trapper.with_trap(&loops, &seen);
-        shape(map, looks, region, group, seen, painted)
+        shape(map, looks, region, group, outlines.seen, painted)
     });
     (groups, shapes.collect())
+}
+
+/// Thickness in pixels of shapes that are not painted: they would change no pixel by a step of 8 bits.
+const UNSEEN: f64 = 1.0 / 256.0;
+
+/// The border of a region.
+struct Outlines {
+    /// Of half-edges, each closed.
+    loops: Vec<Vec<u32>>,
+    /// The corners of those that have an area, in pixels.
+    seen: Vec<Vec<DVec2>>,
+}
+
+impl Outlines {
+    fn is_unseen(&self) -> bool {
+        trap::thickness(&self.seen) < UNSEEN
+    }
+}
+
+fn outlines(
+    subdivision: &Subdivision,
+    rank: &[u32],
+    region: &Region,
+    grid: &PixelGrid,
+) -> Outlines {
+    let loops = trace::loops(subdivision, &border(subdivision, rank, region));
+    let corners = |edges: &Vec<u32>| {
+        let points: Vec<DVec2> = edges.iter().map(|&e| subdivision.ends(e)[0]).collect();
+        let corners = trace::corners(&points, COINCIDENT);
+        let in_pixels = |corner: usize| grid.pixels_from_image(points[corner]);
+        (!corners.is_empty()).then(|| corners.into_iter().map(in_pixels).collect())
+    };
+    let seen = loops.iter().filter_map(corners).collect();
+    Outlines { loops, seen }
 }
 
 /// The half-edges between a region and others.

@@ -16,6 +16,12 @@
 //!       \ _ . - ' exit                less what is nearer to an exit than to a-b.
 //! ```
 //!
+//! Shapes thinner than [`super::UNSEEN`] are not painted, and all others reach under them as if they
+//! were painted last: however thin a shape is, it would be seen, since the edges of what lies on top of
+//! it let a quarter of it through.
+//!
+//! Beyond a sharp point of the shape, where zones at either side would leave a wedge open, lies one more.
+//!
 //! An exit is a side beyond which there is nothing, or a shape painted earlier: where the trap would peep
 //! out. What is nearer to it than to the own side is given up, by one cut along the bisector of the two.
 
@@ -46,6 +52,27 @@ const COINCIDENT: f64 = 1e-6;
 /// thousandth to which files are written. What is seen of shapes is not moved.
 const STRAIGHT: f64 = 1e-4;
 
+/// A shape is thin if it is thinner than traps are wide; this share of its border must be towards earlier
+/// shapes or nothing for its traps to be narrow: with less, it is a slit between later shapes, which
+/// nothing else would fill.
+const EARLIER_SHARE: f64 = 0.25;
+
+/// Mean thickness of a shape: that of a long strip with the same area and border.
+pub(super) fn thickness(outlines: &[Vec<DVec2>]) -> f64 {
+    let (mut area, mut border) = (0.0, 0.0);
+    for outline in outlines {
+        area += signed_area(outline);
+        let next = outline.iter().cycle().skip(1);
+        let lengths = outline.iter().zip(next).map(|(&p, &q)| (q - p).length());
+        border += lengths.sum::<f64>();
+    }
+    if border > 0.0 {
+        2.0 * area / border
+    } else {
+        0.0
+    }
+}
+
 /// A straight part of a shape's border, all of it towards later shapes, or none of it.
 struct Side {
     from: DVec2,
@@ -58,6 +85,28 @@ struct Side {
 impl Side {
     fn is_trapped(&self) -> bool {
         !self.edges.is_empty()
+    }
+
+    /// Whether the zones of two sides that follow one another meet halfway.
+    fn meets(&self, other: &Side) -> bool {
+        other.is_trapped() && self.along.dot(other.along) > SHARP
+    }
+
+    /// Where the shape comes to a point that is too sharp for the zones to meet: a side across it,
+    /// whose zone lies beyond the point.
+    fn cap(&self, after: &Side, width: f64) -> Option<Side> {
+        let is_tip = cross(self.along, after.along) > 0.0;
+        if !is_tip || !after.is_trapped() || self.meets(after) {
+            return None;
+        }
+        let out = (self.along - after.along).normalize_or_zero();
+        let along = out.perp();
+        Some(Side {
+            from: self.to - width * along,
+            along,
+            to: self.to + width * along,
+            edges: vec![self.edges[self.edges.len() - 1], after.edges[0]],
+        })
     }
 }
 
@@ -81,10 +130,11 @@ impl<'a> Trapper<'a> {
 
     /// What is to be painted of the shape within `loops` of half-edges, whose corners are `seen`.
     pub fn with_trap(&self, loops: &[Vec<u32>], seen: &[Vec<DVec2>]) -> Vec<Vec<DVec2>> {
+        let width = self.width_for(loops, seen);
         let mut traps = Vec::new();
-        if self.width > 0.0 {
+        if width > 0.0 {
             for edges in loops {
-                self.trap_loop(edges, &mut traps);
+                self.trap_loop(edges, width, &mut traps);
             }
         }
         if traps.is_empty() {
@@ -106,6 +156,36 @@ impl<'a> Trapper<'a> {
             .collect()
     }
 
+    /// How wide the traps of a shape are. A thin shape along one that is painted before, which then is
+    /// there to fill the pixels, has traps no wider than itself: wider ones would show beside the edge
+    /// of the shape on top, as if the thin one were a pixel wide.
+    fn width_for(&self, loops: &[Vec<u32>], seen: &[Vec<DVec2>]) -> f64 {
+        let thickness = thickness(seen);
+        if thickness >= self.width {
+            return self.width;
+        }
+        let (mut all, mut towards_earlier) = (0.0, 0.0);
+        for &edge in loops.iter().flatten() {
+            let [from, to] = self.pixels(edge);
+            let length = (to - from).length();
+            all += length;
+            if !self.is_trapped(edge) {
+                towards_earlier += length;
+            }
+        }
+        if towards_earlier > EARLIER_SHARE * all {
+            thickness
+        } else {
+            self.width
+        }
+    }
+
+    /// Whether what is across a half-edge is painted later.
+    fn is_trapped(&self, edge: u32) -> bool {
+        let across = self.subdivision.across(edge);
+        across.is_some_and(|fragment| self.rank[fragment as usize] > self.own_rank(edge))
+    }
+
     fn own_rank(&self, edge: u32) -> u32 {
         self.rank[self.subdivision.half_edge(edge).polygon as usize]
     }
@@ -115,13 +195,16 @@ impl<'a> Trapper<'a> {
         ends.map(|point| self.grid.pixels_from_image(point))
     }
 
-    fn trap_loop(&self, edges: &[u32], traps: &mut Vec<Vec<DVec2>>) {
+    fn trap_loop(&self, edges: &[u32], width: f64, traps: &mut Vec<Vec<DVec2>>) {
         let sides = self.sides(edges);
         for (index, side) in sides.iter().enumerate() {
             if side.is_trapped() {
                 let before = &sides[(index + sides.len() - 1) % sides.len()];
                 let after = &sides[(index + 1) % sides.len()];
-                self.trap_side(side, &Zone::new(side, before, after, self.width), traps);
+                self.trap_side(side, &Zone::new(side, before, after, width), traps);
+                if let Some(cap) = side.cap(after, width) {
+                    self.trap_side(&cap, &Zone::new(&cap, &cap, &cap, width), traps);
+                }
             }
         }
     }
@@ -133,13 +216,9 @@ impl<'a> Trapper<'a> {
         for corner in trace::corners(&points, COINCIDENT) {
             starts_side[corner] = true;
         }
-        let is_trapped = |edge: u32| {
-            let across = self.subdivision.across(edge);
-            across.is_some_and(|fragment| self.rank[fragment as usize] > self.own_rank(edge))
-        };
         for (index, &edge) in edges.iter().enumerate() {
             let before = edges[(index + edges.len() - 1) % edges.len()];
-            starts_side[index] |= is_trapped(before) != is_trapped(edge);
+            starts_side[index] |= self.is_trapped(before) != self.is_trapped(edge);
         }
         let Some(first) = starts_side.iter().position(|&starts| starts) else {
             return Vec::new();
@@ -158,7 +237,7 @@ impl<'a> Trapper<'a> {
             }
             let side = sides.last_mut().expect("the first of them starts a side");
             side.to = to;
-            if is_trapped(edges[index]) {
+            if self.is_trapped(edges[index]) {
                 side.edges.push(edges[index]);
             }
         }
@@ -181,9 +260,7 @@ impl<'a> Trapper<'a> {
             for half_plane in &zone.0 {
                 part = clipped(&part, half_plane);
             }
-            if signed_area(&part) <= NEGLIGIBLE_AREA {
-                continue;
-            }
+            // However thin the part is, what lies beyond it may be reached through it.
             for edge in edges {
                 let ends = self.pixels(edge);
                 if !zone.meets(ends) {
@@ -237,8 +314,7 @@ impl Zone {
     fn new(side: &Side, before: &Side, after: &Side, width: f64) -> Self {
         let away = distance_from(side.from, side.along).negated();
         let meeting = |neighbour: &Side| {
-            let meets = neighbour.is_trapped() && neighbour.along.dot(side.along) > SHARP;
-            let across = if meets {
+            let across = if side.meets(neighbour) {
                 (side.along + neighbour.along).normalize_or_zero()
             } else {
                 side.along
@@ -258,7 +334,8 @@ impl Zone {
     fn meets(&self, [from, to]: [DVec2; 2]) -> bool {
         let mut part = [0.0, 1.0];
         for half_plane in &self.0 {
-            let (start, end) = (half_plane.at(from), half_plane.at(to));
+            // A little more than the zone: a side may lie on its border, but for rounding.
+            let [start, end] = [from, to].map(|end| half_plane.at(end) + COINCIDENT);
             if start < 0.0 && end < 0.0 {
                 return false;
             }
