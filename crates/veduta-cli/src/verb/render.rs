@@ -66,9 +66,9 @@ Examples:
   Linear light for compositing, in tiles of half floats:
       veduta render town.obj -o town.exr --depth half --tile 64
   A drawing for print, with lines of a quarter of a millimetre:
-      veduta render town.obj -o town.pdf --lines silhouette,crease --line-width 0.25mm
+      veduta render town.obj -o town.pdf --lines crease --line-width 0.25mm
   Lines only, for an illustration:
-      veduta render part.glb -o part.svg --fill none --lines silhouette,crease,boundary
+      veduta render town.obj -o a.svg --fill none --lines silhouette,crease
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";

@@ -2,6 +2,7 @@
 
 mod damaged;
 mod round_trips;
+mod vector;
 
 use std::path::PathBuf;
 use tempfile::TempDir;

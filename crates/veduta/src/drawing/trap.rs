@@ -52,11 +52,6 @@ const COINCIDENT: f64 = 1e-6;
 /// thousandth to which files are written. What is seen of shapes is not moved.
 const STRAIGHT: f64 = 1e-4;
 
-/// A shape is thin if it is thinner than traps are wide; this share of its border must be towards earlier
-/// shapes or nothing for its traps to be narrow: with less, it is a slit between later shapes, which
-/// nothing else would fill.
-const EARLIER_SHARE: f64 = 0.25;
-
 /// Mean thickness of a shape: that of a long strip with the same area and border.
 pub(super) fn thickness(outlines: &[Vec<DVec2>]) -> f64 {
     let (mut area, mut border) = (0.0, 0.0);
@@ -130,11 +125,10 @@ impl<'a> Trapper<'a> {
 
     /// What is to be painted of the shape within `loops` of half-edges, whose corners are `seen`.
     pub fn with_trap(&self, loops: &[Vec<u32>], seen: &[Vec<DVec2>]) -> Vec<Vec<DVec2>> {
-        let width = self.width_for(loops, seen);
         let mut traps = Vec::new();
-        if width > 0.0 {
+        if self.width > 0.0 {
             for edges in loops {
-                self.trap_loop(edges, width, &mut traps);
+                self.trap_loop(edges, &mut traps);
             }
         }
         if traps.is_empty() {
@@ -156,30 +150,6 @@ impl<'a> Trapper<'a> {
             .collect()
     }
 
-    /// How wide the traps of a shape are. A thin shape along one that is painted before, which then is
-    /// there to fill the pixels, has traps no wider than itself: wider ones would show beside the edge
-    /// of the shape on top, as if the thin one were a pixel wide.
-    fn width_for(&self, loops: &[Vec<u32>], seen: &[Vec<DVec2>]) -> f64 {
-        let thickness = thickness(seen);
-        if thickness >= self.width {
-            return self.width;
-        }
-        let (mut all, mut towards_earlier) = (0.0, 0.0);
-        for &edge in loops.iter().flatten() {
-            let [from, to] = self.pixels(edge);
-            let length = (to - from).length();
-            all += length;
-            if !self.is_trapped(edge) {
-                towards_earlier += length;
-            }
-        }
-        if towards_earlier > EARLIER_SHARE * all {
-            thickness
-        } else {
-            self.width
-        }
-    }
-
     /// Whether what is across a half-edge is painted later.
     fn is_trapped(&self, edge: u32) -> bool {
         let across = self.subdivision.across(edge);
@@ -195,15 +165,15 @@ impl<'a> Trapper<'a> {
         ends.map(|point| self.grid.pixels_from_image(point))
     }
 
-    fn trap_loop(&self, edges: &[u32], width: f64, traps: &mut Vec<Vec<DVec2>>) {
+    fn trap_loop(&self, edges: &[u32], traps: &mut Vec<Vec<DVec2>>) {
         let sides = self.sides(edges);
         for (index, side) in sides.iter().enumerate() {
             if side.is_trapped() {
                 let before = &sides[(index + sides.len() - 1) % sides.len()];
                 let after = &sides[(index + 1) % sides.len()];
-                self.trap_side(side, &Zone::new(side, before, after, width), traps);
-                if let Some(cap) = side.cap(after, width) {
-                    self.trap_side(&cap, &Zone::new(&cap, &cap, &cap, width), traps);
+                self.trap_side(side, &Zone::new(side, before, after, self.width), traps);
+                if let Some(cap) = side.cap(after, self.width) {
+                    self.trap_side(&cap, &Zone::new(&cap, &cap, &cap, self.width), traps);
                 }
             }
         }
@@ -277,7 +247,11 @@ impl<'a> Trapper<'a> {
                     }
                     Some(across) => self.rank[across as usize] < own_rank,
                 };
-                if is_exit {
+                // Along the side itself there is no nearer half.
+                let is_along = ends
+                    .iter()
+                    .all(|&end| zone.0[0].at(end).abs() <= COINCIDENT);
+                if is_exit && !is_along {
                     part = clipped(&part, &nearer_to_side(side, ends));
                 }
             }
@@ -333,9 +307,10 @@ impl Zone {
     /// Whether a part of a segment lies in the zone.
     fn meets(&self, [from, to]: [DVec2; 2]) -> bool {
         let mut part = [0.0, 1.0];
-        for half_plane in &self.0 {
-            // A little more than the zone: a side may lie on its border, but for rounding.
-            let [start, end] = [from, to].map(|end| half_plane.at(end) + COINCIDENT);
+        for (index, half_plane) in self.0.iter().enumerate() {
+            // A little more on the own side: what lies along it does so but for rounding.
+            let margin = if index == 0 { COINCIDENT } else { 0.0 };
+            let [start, end] = [from, to].map(|end| half_plane.at(end) + margin);
             if start < 0.0 && end < 0.0 {
                 return false;
             }
