@@ -3,7 +3,10 @@
 use crate::excerpt::with_excerpts;
 use std::fmt;
 use std::io::{self, IsTerminal};
-use veduta_io::{ErrorKind, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem};
+use veduta::map::file::FileError;
+use veduta_io::{
+    ErrorKind, MapFileError, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem,
+};
 
 /// Exit codes. `0` is success, `130` an interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +71,20 @@ impl From<ReadError> for Failure {
         };
         let colored = io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
         Self::new(code, with_excerpts(&error, "\nveduta: error: ", colored))
+    }
+}
+
+impl From<MapFileError> for Failure {
+    fn from(error: MapFileError) -> Self {
+        let code = match error.problem {
+            FileError::Io { ref source, .. } if source.kind() == io::ErrorKind::NotFound => {
+                Code::Missing
+            }
+            FileError::Io { .. } => Code::InputOutput,
+            FileError::Version { .. } => Code::Unsupported,
+            _ => Code::BadInput,
+        };
+        Self::new(code, error.to_string())
     }
 }
 

@@ -78,6 +78,8 @@ struct Common {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Render(Box<verb::render::Render>),
+    Shade(Box<verb::shade::Shade>),
+    Composite(Box<verb::composite::Composite>),
     Info(Box<verb::info::Info>),
     Check(verb::check::Check),
     Diff(verb::diff::Diff),
@@ -123,7 +125,11 @@ fn run(arguments: Arguments) -> Result<Ending, Failure> {
     let mut talk = Talk::new(common.quiet, common.verbose, common.progress);
     let fine = |()| Ending::Fine;
     match &arguments.verb {
-        Verb::Render(render) => render.run(common.json, &mut talk).map(fine),
+        Verb::Render(render) => render.run(common.force, common.json, &mut talk).map(fine),
+        Verb::Shade(shade) => shade.run(common.json, &mut talk).map(fine),
+        Verb::Composite(composite) => composite
+            .run(common.force, common.json, &mut talk)
+            .map(fine),
         Verb::Info(info) => info.run(common.json, &mut talk).map(fine),
         Verb::Check(check) => check.run(common.json, &mut talk),
         Verb::Diff(diff) => diff.run(common.json, &mut talk),

@@ -102,6 +102,43 @@ pub fn shift(text: &str) -> Result<DVec2, String> {
     }
 }
 
+/// `S` or `SX,SY`: factors of a picture's size.
+pub fn scale(text: &str) -> Result<DVec2, String> {
+    let (x, y) = text.split_once(',').unwrap_or((text, text));
+    let parsed = x.trim().parse().ok().zip(y.trim().parse().ok());
+    match parsed.map(|(x, y)| DVec2::new(x, y)) {
+        Some(scale) if scale.min_element() > 0.0 && scale.max_element() <= 1e6 => Ok(scale),
+        _ => Err("expected a factor above 0, or two, such as 2 or 2,0.5".into()),
+    }
+}
+
+/// A part of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// Its left top corner, in pixels of the whole.
+    pub left_top: DVec2,
+    pub size: Size,
+}
+
+/// `X,Y,W,H`: a part of a picture, in its pixels.
+pub fn window(text: &str) -> Result<Window, String> {
+    let expected = || "expected X,Y,WIDTH,HEIGHT in pixels, such as 100,50,640,480".to_owned();
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let &[x, y, width, height] = parts.as_slice() else {
+        return Err(expected());
+    };
+    let place = x.parse().ok().zip(y.parse().ok());
+    let left_top = place
+        .map(|(x, y)| DVec2::new(x, y))
+        .filter(|place| place.is_finite());
+    let size = width.parse().ok().zip(height.parse().ok());
+    let (left_top, (width, height)) = left_top.zip(size).ok_or_else(expected)?;
+    Ok(Window {
+        left_top,
+        size: Size::new(width, height)?,
+    })
+}
+
 /// A finite length above 0, in metres.
 pub fn length(text: &str) -> Result<f64, String> {
     let number = text.strip_suffix('m').unwrap_or(text).trim().parse::<f64>();

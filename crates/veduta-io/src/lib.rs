@@ -7,6 +7,7 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
+mod map_file;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",
@@ -21,6 +22,7 @@ mod scale;
 pub mod tone;
 mod write;
 
+pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, source_of, write_map};
 #[cfg(any(
     feature = "gltf",
     feature = "obj",
@@ -36,7 +38,7 @@ pub use read::{
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};
 #[cfg(feature = "toml")]
-pub use read::{closest_name, scene_file_schema};
+pub use read::{change_scene, closest_name, scene_file_schema, set_in_scene};
 pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
 pub use scale::scaled;
 pub use write::{

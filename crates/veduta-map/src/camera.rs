@@ -1,9 +1,10 @@
+use serde::{Deserialize, Serialize};
 use veduta_geometry::{Affine, DMat4, DVec2, DVec3};
 
 /// How eye space is projected into the image plane.
 ///
 /// The frame is the unit square of the image plane: `(0, 0)` is the top left corner of the picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Projection {
     /// Central projection: nearness is 1/z.
     Perspective {
@@ -22,7 +23,7 @@ pub enum Projection {
 }
 
 /// A camera: where it stands and how it projects.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// Rigid motion from world to eye space (x right, y down, z forward).
     pub eye_from_world: DMat4,

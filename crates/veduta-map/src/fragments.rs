@@ -211,3 +211,12 @@ impl Fragments {
         self.vertices.len()
     }
 }
+
+/// What is seen of some faces: what an engine finds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Where opaque faces are seen; these do not overlap.
+    pub opaque: Fragments,
+    /// Where veils are seen: cut by the opaque faces in front of them, not by one another.
+    pub veils: Fragments,
+}

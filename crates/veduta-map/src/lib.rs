@@ -9,15 +9,19 @@
 
 mod camera;
 mod faces;
+pub mod file;
 mod fragments;
 mod ids;
 mod line;
 mod map;
+pub mod scene;
+mod stored;
 
 pub use camera::{Camera, Projection};
 pub use faces::Faces;
-pub use fragments::{Fragment, Fragments, Side};
+pub use fragments::{Fragment, Fragments, Seen, Side};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
 pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};
+pub use stored::SeenScene;
 pub use veduta_geometry::Affine;

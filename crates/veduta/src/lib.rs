@@ -9,6 +9,8 @@
 
 pub mod accumulate;
 mod buckets;
+mod clip;
+pub mod composite;
 pub mod dice;
 pub mod drawing;
 pub mod pipeline;

@@ -202,23 +202,20 @@ fn render_pixels(
         });
 }
 
-/// Draws a map of `scene`, which must be the scene that the map was made of, as shapes and lines.
+/// Draws a map of `scene`, which must be the scene that the map was made of, as shapes and lines, in a
+/// picture of `grid`.
 ///
 /// Each shape has one colour: that of its faces, or where it differs from point to point (textures,
-/// smooth normals, colours at corners) the mean over what [`render_map`] shows of the face in a picture
-/// of that size.
-///
-/// # Panics
-/// As [`render_map`].
-pub fn draw_map(
+/// smooth normals, colours at corners) the mean over what [`render_window`] shows of the face.
+pub fn draw_window(
     scene: &Scene,
     map: &VisibilityMap,
-    settings: &RenderSettings,
-    drawing: &drawing::Settings,
+    grid: &PixelGrid,
+    unlit: bool,
+    settings: &drawing::Settings,
 ) -> Drawing {
-    let grid = PixelGrid::of_frame(settings.width, settings.height);
-    let looks = looks(scene, map, &grid, settings.unlit);
-    drawing::draw(scene, map, &looks, &grid, drawing)
+    let looks = looks(scene, map, grid, unlit);
+    drawing::draw(scene, map, &looks, grid, settings)
 }
 
 /// What each fragment looks like; the same for all of a face.

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod completions;
+pub mod composite;
 pub mod diff;
 pub mod examples;
 pub mod info;
@@ -10,12 +11,16 @@ pub mod man;
 mod output;
 pub mod render;
 pub mod schema;
+pub mod shade;
+mod stored;
 mod vector;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use clap::{Args, ValueEnum};
 use std::path::Path;
+use veduta::pipeline::Shortcoming;
+use veduta::scene::Scene;
 use veduta_io::{
     LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
 };
@@ -87,6 +92,35 @@ fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result
         talk.warn(warning.to_string());
     }
     Ok(loaded)
+}
+
+/// Warns of what a picture of `file` will not show as it should; if strict, fails.
+fn tell_shortcomings(
+    file: &Path,
+    scene: &Scene,
+    shortcomings: &[Shortcoming],
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    let file = file.display();
+    for shortcoming in shortcomings {
+        let message = match shortcoming {
+            Shortcoming::DrawnOpaque(material) => {
+                let name = &scene.material(*material).name;
+                format!("{file}: the material {name:?} is not opaque, but drawn so")
+            }
+            Shortcoming::VeilsLeftOut(count) => {
+                format!("{file}: {count} pieces of surfaces that are not opaque are left out")
+            }
+            other => format!("{file}: not shown as it should be: {other:?}"),
+        };
+        if strict {
+            let message = format!("{message} (an error because of --strict)");
+            return Err(Failure::new(Code::Unsupported, message));
+        }
+        talk.warn(message);
+    }
+    Ok(())
 }
 
 /// What to say of a name that is not among `known`, which are called `what`.

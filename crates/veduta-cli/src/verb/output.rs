@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
 use veduta_io::{
     ExrCompression, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, VECTOR_SUFFIXES,
-    VectorFormat, WriteProblem, stream_picture, write_picture_as,
+    VectorFormat, WriteProblem, is_map, stream_picture, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -108,6 +108,12 @@ pub enum Place {
 }
 
 impl Output {
+    /// The place of a stored map, if one is asked for.
+    pub fn map_place(&self) -> Option<&Path> {
+        let output = self.output.as_deref();
+        output.filter(|output| self.format.is_none() && is_map(output))
+    }
+
     /// The place for a vector picture, if one is asked for.
     pub fn vector_target(&self, json: bool) -> Result<Option<VectorTarget>, Failure> {
         let Some(output) = &self.output else {

@@ -1,20 +1,20 @@
 use super::look::Look;
 use super::output::Output;
-use super::vector::{Vector, VectorTarget};
-use super::{Reading, load, unknown_name};
+use super::stored::{refuse_place, summary, tell_work};
+use super::vector::{Subject, Vector, VectorTarget};
+use super::{Reading, load, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
 use crate::values::{self, FieldOfView, Size};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use veduta::accumulate::Picture;
-use veduta::drawing::{Drawing, Evenness, Shape};
-use veduta::map::{Camera, Projection};
-use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Shortcoming, Step};
+use veduta::dice::PixelGrid;
+use veduta::map::{Camera, Projection, SeenScene};
+use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Loaded, scaled};
+use veduta_io::{Loaded, scaled, source_of, write_map};
 
 /// Make a picture of a model
 ///
@@ -69,6 +69,8 @@ Examples:
       veduta render town.obj -o town.pdf --lines crease --line-width 0.25mm
   Lines only, for an illustration:
       veduta render town.obj -o a.svg --fill none --lines silhouette,crease
+  What is seen, kept for any number of pictures:
+      veduta render town.obj -o kept.veduta
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -110,11 +112,14 @@ impl Render {
     /// Width and height in pixels where none are given.
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
-    pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+    pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         if let Some(target) = self.output.vector_target(json)? {
             return self.draw(&target, json, talk);
         }
         self.vector.refuse()?;
+        if let Some(place) = self.output.map_place() {
+            return self.run_to_map(place, force, json, talk);
+        }
         let target = self.output.target(json)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
@@ -161,7 +166,7 @@ impl Render {
             }
             _ => {}
         });
-        self.tell_shortcomings(&scene, &shortcomings, talk)?;
+        tell_shortcomings(&self.model, &scene, &shortcomings, self.strict, talk)?;
         talk.begin("developing");
         // Before it is developed, since pictures are scaled in linear light.
         let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
@@ -204,88 +209,69 @@ impl Render {
             let message = "a vector picture is made of exact regions; leave --sampling out";
             return Err(Failure::new(Code::Usage, message));
         }
-        let what = self.vector.drawing(target.format)?;
+        let settings = self.vector.drawing(target.format)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
         let development = self.look.development(&scene, self.strict, talk)?;
-        let background = development.plain_background()?;
-        let settings = RenderSettings {
-            width: size.width,
-            height: size.height,
-            sampling: Sampling::Exact,
-            unlit: self.look.unlit,
-        };
         talk.begin("finding visibility");
         let map = pipeline::find_visibility(&scene, &camera);
-        let shortcomings = pipeline::shortcomings(&scene, &map);
-        self.tell_shortcomings(&scene, &shortcomings, talk)?;
-        talk.begin("drawing");
-        let mut drawing = pipeline::draw_map(&scene, &map, &settings, &what);
-        let mut ev = 0.0;
-        if what.shapes {
-            self.tell_means(&drawing, talk)?;
-            // Exposed as the picture of pixels would be: automatic exposure looks at those.
-            talk.begin("developing");
-            let mut picture = pipeline::render_map(&scene, &map, &settings);
-            ev = development.develop(&mut picture, true);
-            let mut colors = picture_of_colors(&drawing);
-            development.develop_at(&mut colors, ev, true);
-            for (shape, &[r, g, b, _]) in drawing.shapes.iter_mut().zip(&colors.pixels) {
-                shape.radiance = [r, g, b];
-            }
-        }
-        talk.begin("writing");
-        let title = self.model.file_name().unwrap_or_default().to_string_lossy();
-        let options = self.vector.options(title.into_owned(), background);
-        target.write(&drawing, &options)?;
-        talk.end();
-        talk.detail(format_args!(
-            "{} faces seen in {} fragments, {} shapes, {} lines, exposure {ev:.2} EV",
-            drawing
-                .shapes
-                .iter()
-                .map(|shape| shape.faces)
-                .sum::<usize>(),
-            map.opaque.len(),
-            drawing.shapes.len(),
-            drawing.strokes.len()
-        ));
+        let subject = Subject {
+            file: &self.model,
+            scene: &scene,
+            map: &map,
+            grid: &PixelGrid::of_frame(size.width, size.height),
+            unlit: self.look.unlit,
+            strict: self.strict,
+        };
+        let mut told = self
+            .vector
+            .draw(target, &settings, &subject, &development, talk)?;
         if json {
-            let told = serde_json::json!({
-                "output": target.place.name(),
-                "size": [size.width, size.height],
-                "faces": scene.face_count(),
-                "fragments": map.opaque.len(),
-                "shapes": drawing.shapes.len(),
-                "mean_shapes": uneven_shapes(&drawing),
-                "lines": drawing.strokes.len(),
-                "exposure": ev,
-                "warnings": talk.warnings(),
-            });
+            told["faces"] = scene.face_count().into();
+            told["warnings"] = talk.warnings().into();
             print(&format!("{told}\n"))?;
         }
         Ok(())
     }
 
-    /// Warns of shapes that have more than one colour; if strict, fails.
-    fn tell_means(&self, drawing: &Drawing, talk: &mut Talk) -> Result<(), Failure> {
-        let uneven = uneven_shapes(drawing);
-        if uneven == 0 {
-            return Ok(());
+    /// Stores what is seen instead of showing it.
+    fn run_to_map(
+        &self,
+        place: &Path,
+        force: bool,
+        json: bool,
+        talk: &mut Talk,
+    ) -> Result<(), Failure> {
+        refuse_place(place, force)?;
+        if self.output.preview.is_some() || self.sampling != Sampling::Exact {
+            let message = "a map is of no picture: --preview and --sampling are not for .veduta";
+            return Err(Failure::new(Code::Usage, message));
         }
-        let message = format!(
-            "{}: {uneven} of {} shapes have the mean of their colours, which differ from point to \
-             point (textures, smooth normals, colours at corners)",
-            self.model.display(),
-            drawing.shapes.len()
-        );
-        if self.strict {
-            let message = format!("{message} (an error because of --strict)");
-            return Err(Failure::new(Code::Unsupported, message));
+        let source = source_of(&self.model)?;
+        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
+        talk.begin("finding visibility");
+        let map = pipeline::find_visibility(&scene, &camera);
+        let seen = SeenScene::of(&scene, &map, [size.width, size.height]);
+        talk.begin("writing");
+        write_map(place, &seen, &[source])?;
+        talk.end();
+        talk.detail(format_args!("{}", summary(&seen)));
+        if json {
+            let mut told = serde_json::json!({
+                "output": place.to_string_lossy(),
+                "size": seen.size,
+                "faces": scene.face_count(),
+                "facesSeen": seen.map.faces.len(),
+                "warnings": talk.warnings(),
+            });
+            tell_work(&mut told);
+            print(&format!("{told}\n"))?;
         }
-        talk.warn(message);
         Ok(())
     }
 
@@ -307,56 +293,6 @@ impl Render {
         }
         scene.keep_layers(|layer| self.layer.contains(&layer.name));
         Ok(())
-    }
-
-    /// Warns of what the picture will not show as it should; if strict, fails.
-    fn tell_shortcomings(
-        &self,
-        scene: &Scene,
-        shortcomings: &[Shortcoming],
-        talk: &mut Talk,
-    ) -> Result<(), Failure> {
-        let model = self.model.display();
-        for shortcoming in shortcomings {
-            let message = match shortcoming {
-                Shortcoming::DrawnOpaque(material) => {
-                    let name = &scene.material(*material).name;
-                    format!("{model}: the material {name:?} is not opaque, but drawn so")
-                }
-                Shortcoming::VeilsLeftOut(count) => {
-                    format!("{model}: {count} pieces of surfaces that are not opaque are left out")
-                }
-                other => format!("{model}: not shown as it should be: {other:?}"),
-            };
-            if self.strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::Unsupported, message));
-            }
-            talk.warn(message);
-        }
-        Ok(())
-    }
-}
-
-/// How many shapes have the mean of several colours.
-fn uneven_shapes(drawing: &Drawing) -> usize {
-    let uneven = drawing
-        .shapes
-        .iter()
-        .filter(|shape| shape.evenness != Evenness::Even);
-    uneven.count()
-}
-
-/// A pixel for each shape, so that their colours are developed as those of pictures are.
-fn picture_of_colors(drawing: &Drawing) -> Picture {
-    let pixel = |shape: &Shape| {
-        let [r, g, b] = shape.radiance;
-        [r, g, b, 1.0]
-    };
-    Picture {
-        width: drawing.shapes.len() as u32,
-        height: 1,
-        pixels: drawing.shapes.iter().map(pixel).collect(),
     }
 }
 

@@ -1,11 +1,21 @@
 //! Vector pictures: what is drawn, and where it goes.
 
+use super::look::Development;
 use super::output::Place;
+use super::tell_shortcomings;
 use crate::exit::{Code, Failure};
+use crate::talk::Talk;
 use crate::values;
 use clap::{Args, ValueEnum};
+use serde_json::Value;
 use std::io;
-use veduta::drawing::{self, Drawing, LineKind};
+use std::path::Path;
+use veduta::accumulate::Picture;
+use veduta::dice::PixelGrid;
+use veduta::drawing::{self, Drawing, Evenness, LineKind, Shape};
+use veduta::map::VisibilityMap;
+use veduta::pipeline;
+use veduta::scene::Scene;
 use veduta_io::{VectorFormat, VectorOptions, WriteProblem, stream_drawing, write_drawing};
 
 /// What a vector picture shows.
@@ -74,7 +84,7 @@ impl Vector {
     }
 
     /// Whether shapes are to be filled.
-    pub fn has_shapes(&self) -> bool {
+    fn has_shapes(&self) -> bool {
         self.fill != Some(Fill::None)
     }
 
@@ -106,8 +116,63 @@ impl Vector {
         })
     }
 
+    /// Draws `subject` and writes it to `target`; returns what `--json` tells of it.
+    pub fn draw(
+        &self,
+        target: &VectorTarget,
+        settings: &drawing::Settings,
+        subject: &Subject,
+        development: &Development,
+        talk: &mut Talk,
+    ) -> Result<Value, Failure> {
+        let Subject {
+            file,
+            scene,
+            map,
+            grid,
+            unlit,
+            strict,
+        } = *subject;
+        let background = development.plain_background()?;
+        let shortcomings = pipeline::shortcomings(scene, map);
+        tell_shortcomings(file, scene, &shortcomings, strict, talk)?;
+        talk.begin("drawing");
+        let mut drawing = pipeline::draw_window(scene, map, grid, unlit, settings);
+        let mut ev = 0.0;
+        if settings.shapes {
+            tell_means(&drawing, file, strict, talk)?;
+            // Exposed as the picture of pixels would be: automatic exposure looks at those.
+            talk.begin("developing");
+            let mut picture = pipeline::render_window(scene, map, grid, unlit);
+            ev = development.develop(&mut picture, true);
+            let mut colors = picture_of_colors(&drawing);
+            development.develop_at(&mut colors, ev, true);
+            for (shape, &[r, g, b, _]) in drawing.shapes.iter_mut().zip(&colors.pixels) {
+                shape.radiance = [r, g, b];
+            }
+        }
+        talk.begin("writing");
+        let title = file.file_name().unwrap_or_default().to_string_lossy();
+        target.write(&drawing, &self.options(title.into_owned(), background))?;
+        talk.end();
+        let (shapes, strokes) = (drawing.shapes.len(), drawing.strokes.len());
+        talk.detail(format_args!(
+            "{} fragments, {shapes} shapes, {strokes} lines, exposure {ev:.2} EV",
+            map.opaque.len()
+        ));
+        Ok(serde_json::json!({
+            "output": target.place.name(),
+            "size": [grid.width, grid.height],
+            "fragments": map.opaque.len(),
+            "shapes": shapes,
+            "meanShapes": uneven_shapes(&drawing),
+            "lines": strokes,
+            "exposure": ev,
+        }))
+    }
+
     /// How the file is to be written.
-    pub fn options(&self, title: String, background: Option<[f32; 3]>) -> VectorOptions {
+    fn options(&self, title: String, background: Option<[f32; 3]>) -> VectorOptions {
         let usual = VectorOptions::default();
         VectorOptions {
             decimals: self.decimals.unwrap_or(usual.decimals),
@@ -116,6 +181,66 @@ impl Vector {
             line_color: self.line_color.unwrap_or(usual.line_color),
             title,
         }
+    }
+}
+
+/// What is drawn.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// Where it comes from, for messages.
+    pub file: &'a Path,
+    pub scene: &'a Scene,
+    pub map: &'a VisibilityMap,
+    pub grid: &'a PixelGrid,
+    /// Without light.
+    pub unlit: bool,
+    /// Warnings are errors.
+    pub strict: bool,
+}
+
+/// Warns of shapes that have more than one colour; if strict, fails.
+fn tell_means(
+    drawing: &Drawing,
+    file: &Path,
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    let uneven = uneven_shapes(drawing);
+    if uneven == 0 {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: {uneven} of {} shapes have the mean of their colours, which differ from point to point \
+         (textures, smooth normals, colours at corners)",
+        file.display(),
+        drawing.shapes.len()
+    );
+    if strict {
+        let message = format!("{message} (an error because of --strict)");
+        return Err(Failure::new(Code::Unsupported, message));
+    }
+    talk.warn(message);
+    Ok(())
+}
+
+/// How many shapes have the mean of several colours.
+fn uneven_shapes(drawing: &Drawing) -> usize {
+    let shapes = drawing.shapes.iter();
+    shapes
+        .filter(|shape| shape.evenness != Evenness::Even)
+        .count()
+}
+
+/// A pixel for each shape, so that their colours are developed as those of pictures are.
+fn picture_of_colors(drawing: &Drawing) -> Picture {
+    let pixel = |shape: &Shape| {
+        let [r, g, b] = shape.radiance;
+        [r, g, b, 1.0]
+    };
+    Picture {
+        width: drawing.shapes.len() as u32,
+        height: 1,
+        pixels: drawing.shapes.iter().map(pixel).collect(),
     }
 }
 

@@ -169,7 +169,10 @@ fn vector_pictures_have_a_shape_for_each_surface_in_the_pixels_colour() {
     let render = format!("render town.obj {FACING}");
     folder.told(&format!("{render} -o a.png"));
     let made = folder.json(&format!("{render} -o a.svg --lines silhouette"));
-    assert_eq!((&made["shapes"], &made["mean_shapes"]), (&2.into(), &0.into()));
+    assert_eq!(
+        (&made["shapes"], &made["meanShapes"]),
+        (&2.into(), &0.into())
+    );
     assert!(made["lines"].as_u64() > Some(0));
     let svg = String::from_utf8(folder.read("a.svg")).expect("text");
     let (width, _, pixels) = png(&folder.read("a.png"));
@@ -181,14 +184,23 @@ fn vector_pictures_have_a_shape_for_each_surface_in_the_pixels_colour() {
         let fill = group.split('"').nth(1).expect("a fill");
         let digits: Vec<char> = fill.chars().skip(1).collect();
         let told = match digits.len() {
-            3 => format!("#{}", digits.iter().flat_map(|d| [d, d]).collect::<String>()),
+            3 => format!(
+                "#{}",
+                digits.iter().flat_map(|d| [d, d]).collect::<String>()
+            ),
             _ => fill.to_owned(),
         };
         assert_eq!(told, long, "{name}");
     }
-    for name in ["a.pdf", "a.geojson"] {
+    for name in ["a.pdf", "a.geojson", "a.veduta"] {
         folder.told(&format!("{render} -o {name}"));
     }
+    folder.told("shade a.veduta -o b.svg --lines silhouette");
+    let [one, other] = ["a.svg", "b.svg"].map(|name| {
+        let svg = String::from_utf8(folder.read(name)).expect("text");
+        svg.lines().skip(2).collect::<Vec<_>>().join("\n")
+    });
+    assert_eq!(one, other, "all but the title");
     let piped = folder.veduta(&format!("{render} -o - --format svg --lines silhouette"));
     let piped = { piped }.assert().success().get_output().stdout.clone();
     assert_eq!(piped, folder.read("a.svg"));
@@ -202,7 +214,10 @@ fn options_of_pixels_and_of_vector_pictures_are_not_mixed() {
         ("-o a.png --lines crease", "--lines is for vector pictures"),
         ("-o a.svg --depth 16", "--depth is for pictures of pixels"),
         ("-o a.svg --fill none", "leaves nothing to draw"),
-        ("-o a.geojson --lines crease", "--lines is for .svg and .pdf"),
+        (
+            "-o a.geojson --lines crease",
+            "--lines is for .svg and .pdf",
+        ),
         ("-o a.svg --sampling multiscan:3", "leave --sampling out"),
         ("-o a.svg --background sky.png", "background of one colour"),
     ] {

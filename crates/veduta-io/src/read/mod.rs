@@ -48,7 +48,7 @@ pub use error::{Detail, ErrorKind, Excerpt, Place, Problem, ReadError, Warning};
 #[cfg(feature = "toml")]
 pub use names::closest as closest_name;
 #[cfg(feature = "toml")]
-pub use scene_file::scene_file_schema;
+pub use scene_file::{change_scene, scene_file_schema, set_in_scene};
 
 use budget::Budget;
 use error::{Fault, Warnings};

@@ -28,13 +28,13 @@ mod vector;
 mod webp;
 
 pub use model::{MODEL_SUFFIXES, write_model};
+pub(crate) use partial_file::PartialFile;
 pub use partial_file::remove_unfinished;
 #[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
 pub use vector::{
     MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
 };
 
-use partial_file::PartialFile;
 use std::fmt;
 use std::io::{self, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};

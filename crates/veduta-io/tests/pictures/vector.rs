@@ -125,23 +125,53 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
     let text = String::from_utf8(encoded("svg", &options)).expect("text");
     let document = Document::parse(&text).expect("XML");
     let svg = document.root_element();
-    assert_eq!(svg.tag_name().namespace(), Some("http://www.w3.org/2000/svg"));
-    assert_eq!((svg.attribute("viewBox"), title_of(svg)), (Some("0 0 20 10"), "1 < 2"));
-    let groups: Vec<Node> = document.descendants().filter(|n| n.has_tag_name("g")).collect();
+    assert_eq!(
+        svg.tag_name().namespace(),
+        Some("http://www.w3.org/2000/svg")
+    );
+    assert_eq!(
+        (svg.attribute("viewBox"), title_of(svg)),
+        (Some("0 0 20 10"), "1 < 2")
+    );
+    let groups: Vec<Node> = document
+        .descendants()
+        .filter(|n| n.has_tag_name("g"))
+        .collect();
     let names: Vec<&str> = groups.iter().map(|&group| title_of(group)).collect();
     let hard = "a & <b> \"c\" 'd'\u{fffd}";
     assert_eq!(
         names,
-        ["town", hard, "7 dwarfs", "town", "lines", "", "silhouettes", "creases"]
+        [
+            "town",
+            hard,
+            "7 dwarfs",
+            "town",
+            "lines",
+            "",
+            "silhouettes",
+            "creases"
+        ]
     );
-    let ids: Vec<&str> = groups.iter().filter_map(|group| group.attribute("id")).collect();
-    assert_eq!(ids[..5], ["town", "a_b_c_d_", "_7_dwarfs", "town-2", "lines"]);
+    let ids: Vec<&str> = groups
+        .iter()
+        .filter_map(|group| group.attribute("id"))
+        .collect();
+    assert_eq!(
+        ids[..5],
+        ["town", "a_b_c_d_", "_7_dwarfs", "town-2", "lines"]
+    );
     let different: BTreeSet<&&str> = ids.iter().collect();
     assert_eq!(different.len(), groups.len(), "{ids:?}");
     let depth = |node: &Node| node.ancestors().filter(|n| n.has_tag_name("g")).count();
-    assert_eq!(groups.iter().map(depth).collect::<Vec<_>>(), [1, 2, 3, 2, 1, 1, 2, 2]);
+    assert_eq!(
+        groups.iter().map(depth).collect::<Vec<_>>(),
+        [1, 2, 3, 2, 1, 1, 2, 2]
+    );
 
-    let paths: Vec<Node> = document.descendants().filter(|n| n.has_tag_name("path")).collect();
+    let paths: Vec<Node> = document
+        .descendants()
+        .filter(|n| n.has_tag_name("path"))
+        .collect();
     let fills: Vec<_> = paths.iter().map(|path| path.attribute("fill")).collect();
     assert_eq!(fills, [Some("#ff8900"), Some("#fff"), None, None]);
     let data = |index: usize| paths[index].attribute("d").expect("a path has data");
@@ -153,9 +183,15 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
             assert!(off < 0.001 * 40.0, "{found:?} and not {outline:?}");
         }
     }
-    assert!(data(2).ends_with('z') && !data(3).ends_with('z'), "one is closed");
+    assert!(
+        data(2).ends_with('z') && !data(3).ends_with('z'),
+        "one is closed"
+    );
     let background = document.descendants().find(|n| n.has_tag_name("rect"));
-    assert_eq!(background.and_then(|rect| rect.attribute("fill")), Some("#00f"));
+    assert_eq!(
+        background.and_then(|rect| rect.attribute("fill")),
+        Some("#00f")
+    );
 }
 
 #[test]
@@ -183,10 +219,19 @@ fn a_pdf_has_a_layer_for_each_group() {
     assert_eq!((count(" BDC"), count("EMC")), (8, 8));
     assert_eq!((count(" m"), count("h"), count("f")), (5, 3, 2));
     assert_eq!((count("s"), count("S")), (1, 1));
-    for what in ["/OCProperties", "/Type /OCG", "/G7 13 0 R", "/MediaBox [0 0 15 7.5]"] {
+    for what in [
+        "/OCProperties",
+        "/Type /OCG",
+        "/G7 13 0 R",
+        "/MediaBox [0 0 15 7.5]",
+    ] {
         assert!(find(what.as_bytes()).is_some(), "{what}");
     }
-    assert_eq!(bytes, encoded("pdf", &VectorOptions::default()), "the same bytes");
+    assert_eq!(
+        bytes,
+        encoded("pdf", &VectorOptions::default()),
+        "the same bytes"
+    );
 }
 
 #[test]
@@ -198,8 +243,13 @@ fn geojson_has_polygons_with_holes_and_says_what_they_are() {
     let properties = &features[0]["properties"];
     assert_eq!(properties["object"], "town/a & <b> \"c\" 'd'\u{7}");
     assert_eq!(properties["material"], "brick \"red\"");
-    assert_eq!((&properties["color"], &properties["faces"]), (&"#ff8900".into(), &2.into()));
-    let polygons = features[0]["geometry"]["coordinates"].as_array().expect("polygons");
+    assert_eq!(
+        (&properties["color"], &properties["faces"]),
+        (&"#ff8900".into(), &2.into())
+    );
+    let polygons = features[0]["geometry"]["coordinates"]
+        .as_array()
+        .expect("polygons");
     let rings: Vec<Vec<DVec2>> = polygons[0]
         .as_array()
         .expect("rings")

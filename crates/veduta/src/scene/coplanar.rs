@@ -10,9 +10,11 @@
 
 use crate::scene::{Mesh, Object, Scene};
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
 use veduta_geometry::{DMat4, DVec3};
+use veduta_map::{FaceId, Faces};
 
 /// Deviation from a plane, relative to the largest coordinate of a face, that counts as rounding:
 /// four units in the last place of single precision, in which most models are stored. More would
@@ -83,6 +85,28 @@ impl PlaneGroups {
         let start = self.pairs.partition_point(|pair| pair.0.0 < object);
         let end = self.pairs.partition_point(|pair| pair.0.0 <= object);
         &self.pairs[start..end]
+    }
+
+    /// Gives the faces of each group the plane of the first of them that is in the table.
+    pub fn share_planes(&self, faces: &mut Faces) {
+        if self.pairs.is_empty() {
+            return;
+        }
+        let mut first_seen: HashMap<FaceIndex, FaceId> = HashMap::new();
+        let mut pairs = self.pairs.iter().peekable();
+        let mut object = None;
+        for face in faces.ids() {
+            let index = (faces.object(face).0, faces.source(face));
+            // Within an object faces and pairs ascend alike.
+            if object != Some(index.0) {
+                object = Some(index.0);
+                pairs = self.of_object(index.0).iter().peekable();
+            }
+            while pairs.next_if(|pair| pair.0 < index).is_some() {}
+            if let Some(&(_, group)) = pairs.next_if(|pair| pair.0 == index) {
+                faces.share_plane(face, *first_seen.entry(group).or_insert(face));
+            }
+        }
     }
 }
 
@@ -235,7 +259,7 @@ impl<'a> PlacedMesh<'a> {
                 continue;
             };
             if next < faces.end
-                && let Some(corner) = self.mesh.corner_beyond_shared_edge(face, next)
+                && let Some(corner) = self.corner_beyond_shared_edge(face, next)
                 && plane.is_near(self.position(corner), plane.tolerance)
             {
                 next += 1;
@@ -250,17 +274,16 @@ impl<'a> PlacedMesh<'a> {
         let mut corners = self.mesh.corners_of(face);
         corners.all(|corner| plane.is_near(self.position(corner), tolerance))
     }
-}
 
-impl Mesh {
     /// The corner of the triangle `other` that lies across the edge that it shares with `face`, if both
     /// are triangles with an edge in common, run through in opposite directions: then, in one plane,
     /// they do not overlap. Vertices need not be shared: flat shading gives each face its own.
     fn corner_beyond_shared_edge(&self, face: u32, other: u32) -> Option<u32> {
         let [p, q, r] = self.only_triangle_of(face)?;
         let [a, b, c] = self.only_triangle_of(other)?;
-        let is_same =
-            |a: u32, b: u32| a == b || self.positions[a as usize] == self.positions[b as usize];
+        let is_same = |a: u32, b: u32| {
+            a == b || self.mesh.positions[a as usize] == self.mesh.positions[b as usize]
+        };
         for (from, to) in [(p, q), (q, r), (r, p)] {
             for (start, end, corner) in [(a, b, c), (b, c, a), (c, a, b)] {
                 if is_same(from, end) && is_same(to, start) {
@@ -272,8 +295,8 @@ impl Mesh {
     }
 
     fn only_triangle_of(&self, face: u32) -> Option<[u32; 3]> {
-        let range = self.triangles_of(face);
-        (range.len() == 1).then(|| self.triangles[range.start])
+        let range = self.mesh.triangles_of(face);
+        (range.len() == 1).then(|| self.mesh.triangles[range.start])
     }
 }
 

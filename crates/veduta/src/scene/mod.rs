@@ -1,95 +1,18 @@
 //! What is to be shown: objects made of meshes, their materials, the cameras and lights.
 //!
-//! World space is right-handed with Z up, in metres. Readers of foreign files turn what they read
-//! to this, through [`Object::world_from_object`].
+//! The data themselves are [`veduta_map::scene`]'s, since maps keep what is seen of them. Here stands
+//! what is found out about them before anything is seen.
+//!
+//! Readers of foreign files turn what they read to the world's space, through
+//! [`Object::world_from_object`].
 
 mod coplanar;
 mod framing;
 pub mod generate;
-mod light;
-mod material;
-mod mesh;
-mod world;
 
 pub use coplanar::{FaceIndex, PlaneGroups};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
-pub use light::{Light, LightKind};
-pub use material::{AlphaMode, Image, Material, TexcoordSet, TextureRef, Wrap};
-pub use mesh::{Mesh, MeshError};
-pub use world::{Layer, World};
-
-use veduta_geometry::DMat4;
-use veduta_map::{Camera, MaterialId, ObjectId};
-
-/// Index of a mesh in [`Scene::meshes`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct MeshId(pub u32);
-
-/// Index of an image in [`Scene::images`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct ImageId(pub u32);
-
-/// A mesh placed in the world.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Object {
-    /// Path of names from the root, separated by `/`.
-    pub name: String,
-    /// What it is made of.
-    pub mesh: MeshId,
-    /// Where it stands. Affine; a mirroring transform turns the winding of the faces.
-    pub world_from_object: DMat4,
-}
-
-/// A scene.
-///
-/// The order of `objects` is the key order of coplanar faces: of two that share a plane, the face
-/// of the earlier object is seen.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scene {
-    /// The objects.
-    pub objects: Vec<Object>,
-    /// Meshes, which objects share.
-    pub meshes: Vec<Mesh>,
-    /// Materials, by [`MaterialId`].
-    pub materials: Vec<Material>,
-    /// Pictures that materials refer to.
-    pub images: Vec<Image>,
-    /// Named cameras that came with the model.
-    pub cameras: Vec<(String, Camera)>,
-    /// Lights that came with the model. Pictures do not show them yet; see `shade`.
-    pub lights: Vec<Light>,
-    /// What layers the objects are of, in the order of the objects; empty where there is one only.
-    pub layers: Vec<Layer>,
-    /// Where on Earth the scene is.
-    pub world: World,
-}
-
-impl Scene {
-    /// The object's row.
-    pub fn object(&self, id: ObjectId) -> &Object {
-        &self.objects[id.index()]
-    }
-
-    /// The mesh an object is made of.
-    pub fn mesh_of(&self, id: ObjectId) -> &Mesh {
-        &self.meshes[self.objects[id.index()].mesh.0 as usize]
-    }
-
-    /// The material of a face of an object.
-    pub fn material_of(&self, object: ObjectId, face: u32) -> &Material {
-        self.material(self.mesh_of(object).material_of(face))
-    }
-
-    /// The material's row.
-    pub fn material(&self, id: MaterialId) -> &Material {
-        &self.materials[id.index()]
-    }
-
-    /// Number of faces of all objects.
-    pub fn face_count(&self) -> usize {
-        self.objects
-            .iter()
-            .map(|object| self.meshes[object.mesh.0 as usize].face_count())
-            .sum()
-    }
-}
+pub use veduta_map::scene::{
+    AlphaMode, Image, ImageId, Layer, Light, LightKind, Material, Mesh, MeshError, MeshId, Object,
+    ObjectKey, Scene, TexcoordSet, TextureRef, World, Wrap,
+};

@@ -22,13 +22,23 @@ mod strips;
 pub use project::project;
 pub use strips::{Strip, Strips};
 
-use veduta_map::Fragments;
+pub use veduta_map::Seen;
 
-/// What an engine finds.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Seen {
-    /// Where opaque faces are seen; these do not overlap.
-    pub opaque: Fragments,
-    /// Where veils are seen: cut by the opaque faces in front of them, not by one another.
-    pub veils: Fragments,
+use std::sync::atomic::Ordering::Relaxed;
+
+/// How much visibility was found, since the process began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work {
+    /// Faces put into the image plane.
+    pub projected: u64,
+    /// Faces compared with others to find what is seen of them, by the main engine or in compositing.
+    pub clipped: u64,
+}
+
+/// How much visibility this process has found so far: proof that what works on a stored map finds none.
+pub fn work() -> Work {
+    Work {
+        projected: project::PROJECTED.load(Relaxed),
+        clipped: crate::clip::CLIPPED.load(Relaxed),
+    }
 }

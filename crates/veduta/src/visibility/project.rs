@@ -12,27 +12,29 @@
 
 use crate::scene::{FaceIndex, Mesh, Object, PlaneGroups, Scene};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use veduta_geometry::{DVec2, DVec3, DVec4, signed_area};
-use veduta_map::{Camera, FaceId, Faces, ObjectId, Projection};
+use veduta_map::{Camera, Faces, ObjectId, Projection};
 
 /// Faces a task projects at a time: enough to hide the cost of a task, few enough to share evenly.
 const FACES_PER_TASK: usize = 16 * 1024;
 
+/// Faces projected since the process began; see [`work`](super::work).
+pub(super) static PROJECTED: AtomicU64 = AtomicU64::new(0);
+
 /// The faces of `scene` that may be seen through `camera`, clipped to the view pyramid.
 ///
 /// Faces turned away from the eye are left out where their material is single-sided. Ids ascend by
-/// object, then by face within the object.
+/// object in [key order](Scene::key_order), then by face within the object.
 pub fn project(scene: &Scene, camera: &Camera) -> Faces {
     let groups = PlaneGroups::of(scene);
     let mut faces = Faces::new();
-    for (index, object) in scene.objects.iter().enumerate() {
-        let mesh = &scene.meshes[object.mesh.0 as usize];
-        let view = ObjectView::new(camera, object, mesh);
+    for object in scene.key_order() {
+        let mesh = scene.mesh_of(object);
+        let view = ObjectView::new(camera, scene.object(object), mesh);
         if view.class == Class::Outside {
             continue;
         }
-        let object = ObjectId::from_index(index);
         let groups = groups.of_object(object.0);
         let starts: Vec<usize> = (0..mesh.face_count()).step_by(FACES_PER_TASK).collect();
         let parts: Vec<Faces> = starts
@@ -47,25 +49,9 @@ pub fn project(scene: &Scene, camera: &Camera) -> Faces {
             faces.append(&part);
         }
     }
-    share_planes(&mut faces, groups.pairs());
+    groups.share_planes(&mut faces);
+    PROJECTED.fetch_add(faces.len() as u64, Relaxed);
     faces
-}
-
-/// Gives coplanar faces one plane. Their nearness is the same already.
-fn share_planes(faces: &mut Faces, coplanar: &[(FaceIndex, FaceIndex)]) {
-    if coplanar.is_empty() {
-        return;
-    }
-    let mut first_seen: HashMap<FaceIndex, FaceId> = HashMap::new();
-    // Faces and pairs ascend alike.
-    let mut pairs = coplanar.iter().peekable();
-    for face in faces.ids() {
-        let index = (faces.object(face).0, faces.source(face));
-        while pairs.next_if(|pair| pair.0 < index).is_some() {}
-        if let Some(&(_, group)) = pairs.next_if(|pair| pair.0 == index) {
-            faces.share_plane(face, *first_seen.entry(group).or_insert(face));
-        }
-    }
 }
 
 /// Where something lies with respect to the view pyramid: Nishita & Nakamae's A, B or C, D.
@@ -303,7 +289,7 @@ mod tests {
     use super::*;
     use crate::scene::{Material, MeshId};
     use veduta_geometry::DMat4;
-    use veduta_map::MaterialId;
+    use veduta_map::{FaceId, MaterialId};
 
     fn scene_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, double_sided: bool) -> Scene {
         let mesh = Mesh {

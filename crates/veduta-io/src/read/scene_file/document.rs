@@ -29,6 +29,14 @@ table! {
 }
 
 table! {
+    /// Changes to a scene that is there already.
+    "a file of changes" => struct Changes {
+        /// Changes to materials, by their names, as in scene files.
+        optional material: Named<Text, MaterialChange>,
+    }
+}
+
+table! {
     /// Where on Earth the scene is.
     "[world]" => struct World {
         /// Coordinate reference system, such as "EPSG:7415".

@@ -1,7 +1,7 @@
 //! Changes to the materials that the models bring.
 
-use super::document::{Document, MaterialChange, TextureChange};
-use super::form::Given;
+use super::document::{MaterialChange, TextureChange};
+use super::form::{Given, Named};
 use super::inclusion::Inclusion;
 use super::source::{Faults, Source, Span};
 use super::{find_file, value::Text};
@@ -31,8 +31,11 @@ const MATCHING: MatchOptions = MatchOptions {
 };
 
 /// The changes in the order of the file.
-pub fn globs<'d>(document: &'d Document, faults: &mut Faults) -> Vec<Globbed<'d>> {
-    let changes = document.material.iter().flat_map(|named| &named.value.0);
+pub fn globs<'d>(
+    changes: &'d Option<Given<Named<Text, MaterialChange>>>,
+    faults: &mut Faults,
+) -> Vec<Globbed<'d>> {
+    let changes = changes.iter().flat_map(|named| &named.value.0);
     let mut globs = Vec::new();
     for (text, change) in changes {
         match Pattern::new(&text.value.0) {

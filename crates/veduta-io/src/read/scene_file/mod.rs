@@ -23,10 +23,10 @@ mod material;
 mod source;
 mod value;
 
-use super::error::{Place, Problem, ReadError, Warnings};
+use super::error::{Place, Problem, ReadError, Warning, Warnings};
 use super::names::closest;
 use super::{Loaded, ReadOptions, files, finish};
-use document::Document;
+use document::{Changes, Document};
 use form::{Form, Node};
 use inclusion::Inclusion;
 use serde_json::{Value, json};
@@ -71,7 +71,7 @@ fn read_included(
     let bytes = files::read_whole(path).map_err(|error| whole(Problem::Unreadable(error)))?;
     inclusion.add_input(path, bytes.len());
     let source = Source::new(path, &bytes)?;
-    let document = read_document(&source)?;
+    let document: Document = read_form("a scene file", &source)?;
 
     let mut warnings = Warnings::new(path.to_owned());
     if *options != ReadOptions::default() {
@@ -81,7 +81,7 @@ fn read_included(
     }
     let mut faults = Faults::default();
     let cameras = camera::all(&document, &mut faults);
-    let globs = material::globs(&document, &mut faults);
+    let globs = material::globs(&document.material, &mut faults);
     let layers = layer::plan(&document, path, &mut faults);
     faults.finish(&source)?;
 
@@ -121,8 +121,52 @@ fn read_included(
     })
 }
 
-/// The text as a document, or all that is wrong in it.
-fn read_document(source: &Source<'_>) -> Result<Document, ReadError> {
+/// Changes materials of a scene that is there already, as a scene file changes those that its models
+/// bring: `text` has tables `[material."…"]` and nothing else. Paths in it are relative to `path`, which
+/// names the text in messages.
+///
+/// # Errors
+/// All that is wrong with the text.
+pub fn change_scene(
+    scene: &mut Scene,
+    path: &Path,
+    text: &[u8],
+) -> Result<Vec<Warning>, ReadError> {
+    let source = Source::new(path, text)?;
+    let changes: Changes = read_form("a file of changes", &source)?;
+    let mut faults = Faults::default();
+    let globs = material::globs(&changes.material, &mut faults);
+    faults.finish(&source)?;
+    let mut warnings = Warnings::new(path.to_owned());
+    let mut inclusion = Inclusion::new();
+    inclusion.add_input(path, text.len());
+    material::change(scene, &globs, &source, &mut inclusion, &mut warnings)?;
+    Ok(warnings.finish())
+}
+
+/// Changes a material of a scene by one line, such as `material."city/roofs".color=#446`: what
+/// [`change_scene`] reads, but that words need no quotation marks.
+///
+/// # Errors
+/// All that is wrong with the line.
+pub fn set_in_scene(scene: &mut Scene, line: &str) -> Result<Vec<Warning>, ReadError> {
+    let is_toml = |text: &str| DeTable::parse(text).is_ok();
+    let text = match line.rsplit_once('=') {
+        Some((path, value)) if !is_toml(line) => {
+            let quoted = format!("{path}={}", Value::from(value.trim()));
+            if is_toml(&quoted) {
+                quoted
+            } else {
+                line.to_owned()
+            }
+        }
+        _ => line.to_owned(),
+    };
+    change_scene(scene, Path::new("--set"), text.as_bytes())
+}
+
+/// The text in a form of that name, or all that is wrong in it.
+fn read_form<F: Form>(name: &'static str, source: &Source<'_>) -> Result<F, ReadError> {
     let mut faults = Faults::default();
     let (table, errors) = DeTable::parse_recoverable(source.text);
     for error in errors {
@@ -133,9 +177,9 @@ fn read_document(source: &Source<'_>) -> Result<Document, ReadError> {
 
     let mut faults = Faults::default();
     let root = Node::new(table.span(), DeValue::Table(table.into_inner()));
-    let document = Document::read("a scene file", &root, &mut faults);
+    let form = F::read(name, &root, &mut faults);
     faults.finish(source)?;
-    Ok(document.expect("a document without faults can be read"))
+    Ok(form.expect("a form without faults can be read"))
 }
 
 /// The path of a file that a scene file names, if it is there and may be read.

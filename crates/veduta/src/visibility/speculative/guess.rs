@@ -3,13 +3,10 @@
 //! A face whose greatest nearness in a cell is below the cell's threshold is *guessed* to be hidden
 //! there. The samples may miss a gap, so the guess may be wrong; `verify` finds out.
 
-use super::grid::{Extent, Grid};
+use crate::clip::{Extent, Grid, OPEN};
 use rayon::prelude::*;
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{FaceId, Faces};
-
-/// The threshold of a cell in which nothing is guessed to be hidden.
-pub(super) const OPEN: f32 = f32::NEG_INFINITY;
 
 /// Share of the range of nearness around a cell that is taken off its threshold. Less would make
 /// more wrong guesses, each costing a repair; more would hide fewer faces.

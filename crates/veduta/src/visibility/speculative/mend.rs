@@ -1,11 +1,10 @@
 //! Mending a wrong guess, cell by cell.
 
-use super::cells::{CellLists, listed_between};
-use super::clip::{Clipper, Context};
-use super::found::{Entry, Found, Pile};
-use super::grid::CellSet;
 use super::verify::{Scratch, Verification};
-use super::{FACES_PER_TASK, Report, clip_all};
+use super::{Report, clip_all};
+use crate::clip::{
+    CellLists, CellSet, Clipper, Context, Entry, FACES_PER_TASK, Found, Pile, listed_between,
+};
 use rayon::prelude::*;
 use veduta_map::FaceId;
 

@@ -2,9 +2,9 @@
 //!
 //! 1. [`guess`]: a coarse z-buffer tells, for each cell of the frame, how near the nearest surface
 //!    about is. It only *guesses* what is hidden.
-//! 2. [`cells`]: faces that are not guessed to be hidden everywhere become candidates, and are
+//! 2. `clip::cells`: faces that are not guessed to be hidden everywhere become candidates, and are
 //!    listed in the cells in which they may be seen.
-//! 3. [`clip`]: each candidate is clipped exactly by the nearer candidates that overlap it; where
+//! 3. `clip`: each candidate is clipped exactly by the nearer candidates that overlap it; where
 //!    planes cross, by one more line. Most seen faces are seen whole and need no cut. The cost does
 //!    not depend on any resolution.
 //! 4. [`verify`]: the guess is proved from the result: in each cell where something was guessed to
@@ -16,25 +16,14 @@
 //! be proved: the same exact clip, slower. Input: projected faces. Output: fragments, the same for
 //! any number of threads.
 
-mod cells;
-mod clip;
-mod found;
-mod grid;
 mod guess;
 mod mend;
-mod pieces;
-mod sides;
 mod verify;
 
 use super::Seen;
-use crate::buckets::Buckets;
-use cells::{CellLists, listed_between};
-use clip::{Clipper, Context};
-use found::{Found, Pile};
-use grid::{Extent, Grid};
-use rayon::prelude::*;
-use std::ops::Range;
-use std::sync::Mutex;
+use crate::clip::{
+    CellLists, Context, Extent, Found, Grid, OPEN, Pile, by_place, clip_each, listed_between,
+};
 use veduta_map::{FaceId, Faces};
 use verify::{Scratch, Verification};
 
@@ -85,7 +74,7 @@ pub fn find(faces: &Faces, settings: &Settings) -> Seen {
 /// [`find`], and what it took.
 pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
     let extents = Extent::of_all(faces);
-    let grid = choose_grid(faces.len(), settings);
+    let grid = Grid::choose(faces.len(), settings.aspect, settings.strip, settings.cells);
     let context = Context {
         faces,
         extents: &extents,
@@ -95,7 +84,7 @@ pub fn find_and_report(faces: &Faces, settings: &Settings) -> (Seen, Report) {
     let mut thresholds = if settings.guess {
         guess::thresholds(faces, &extents, &grid, samples_for(&grid))
     } else {
-        vec![guess::OPEN; grid.cells()]
+        vec![OPEN; grid.cells()]
     };
     let (candidates, lists) = listed_between(&context, None, &thresholds);
 
@@ -148,52 +137,11 @@ fn samples_for(grid: &Grid) -> u32 {
     })
 }
 
-/// Faces for each cell, by default.
-const FACES_PER_CELL: f64 = 8.0;
-
-fn choose_grid(faces: usize, settings: &Settings) -> Grid {
-    let cells = settings.cells.map_or_else(
-        || (faces as f64 / FACES_PER_CELL).clamp(1024.0, 1024.0 * 1024.0),
-        |cells| f64::from(cells.max(1)),
-    );
-    let [top, bottom] = settings.strip;
-    let height = bottom - top;
-    let columns = (cells * settings.aspect / height)
-        .sqrt()
-        .round()
-        .clamp(1.0, 16384.0);
-    let rows = (cells / columns).round().clamp(1.0, 16384.0);
-    Grid {
-        columns: columns as u32,
-        rows: rows as u32,
-        top,
-        height,
-    }
-}
-
-/// Candidates clipped by a task at a time.
-const FACES_PER_TASK: usize = 256;
-
 impl Report {
     fn count(&mut self, pile: &Pile) {
         self.pierced += pile.pierced;
         self.tied += pile.tied;
     }
-}
-
-/// The candidates in the order of the cells they begin in: what is compared lies together.
-fn by_place(context: &Context, candidates: &[FaceId]) -> Vec<FaceId> {
-    let cell_of = |face: FaceId| {
-        let span = context.grid.span(&context.extents[face.index()]);
-        context.grid.index(span.columns[0], span.rows[0]) as u32
-    };
-    let cells: Vec<Range<u32>> = candidates
-        .iter()
-        .map(|&face| cell_of(face)..cell_of(face) + 1)
-        .collect();
-    let sorted = Buckets::new(context.grid.cells(), &cells);
-    let in_order = (0..sorted.len()).flat_map(|cell| sorted.of(cell));
-    in_order.map(|&index| candidates[index as usize]).collect()
 }
 
 /// Where what is clipped is measured, to prove the guess.
@@ -214,39 +162,29 @@ fn clip_all(
     found: &mut Found,
     report: &mut Report,
 ) {
-    // A clipper is as large as the scene has faces, so tasks hand theirs on rather than make new ones.
-    let idle: Mutex<Vec<(Clipper, Scratch)>> = Mutex::new(Vec::new());
-    let lock = || idle.lock().expect("no task fails while it holds the lock");
-    let piles: Vec<Pile> = candidates
-        .par_chunks(FACES_PER_TASK)
-        .map(|candidates| {
-            let tools = lock().pop();
-            let (mut clipper, mut scratch) =
-                tools.unwrap_or_else(|| (Clipper::new(*context), Scratch::default()));
-            let mut pile = Pile::default();
-            for &face in candidates {
-                clipper.clip(face, lists);
-                clipper.store(face, &mut pile);
-                if let Some(proof) = proof
-                    && !context.faces.is_veil(face)
-                {
-                    let plane = context.faces.face_nearness(face);
-                    for piece in clipper.pieces.iter() {
-                        let points = piece.iter().map(|corner| corner.point);
-                        let guessed = |cell| proof.lists.guessed(cell);
-                        let Proof {
-                            verification,
-                            thresholds,
-                            ..
-                        } = proof;
-                        verification.add(context, &mut scratch, thresholds, points, plane, guessed);
-                    }
+    let piles = clip_each(
+        context,
+        candidates,
+        |clipper, scratch: &mut Scratch, face, pile| {
+            clipper.clip(face, lists);
+            clipper.store(face, pile);
+            if let Some(proof) = proof
+                && !context.faces.is_veil(face)
+            {
+                let plane = context.faces.face_nearness(face);
+                for piece in clipper.pieces.iter() {
+                    let points = piece.iter().map(|corner| corner.point);
+                    let guessed = |cell| proof.lists.guessed(cell);
+                    let Proof {
+                        verification,
+                        thresholds,
+                        ..
+                    } = proof;
+                    verification.add(context, scratch, thresholds, points, plane, guessed);
                 }
             }
-            lock().push((clipper, scratch));
-            pile
-        })
-        .collect();
+        },
+    );
     for pile in piles {
         report.count(&pile);
         found.add(pile);

@@ -3,8 +3,7 @@
 //!
 //! Then a hidden face is proved to be hidden: something found seen is in front of it everywhere.
 
-use super::clip::Context;
-use super::guess::OPEN;
+use crate::clip::{Context, OPEN};
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 use veduta_geometry::{Affine, Cells, DVec2, GridAreas, signed_area};
 

@@ -5,14 +5,13 @@
 //! lie in piles and an entry for each face tells where. [`Found::into_seen`] sorts once, at the end.
 
 use super::pieces::{Corner, Pieces};
-use crate::visibility::Seen;
 use rayon::prelude::*;
 use veduta_geometry::DVec2;
-use veduta_map::{FaceId, Faces, Fragments, Side};
+use veduta_map::{FaceId, Faces, Fragments, Seen, Side};
 
 /// Fragments of one task, in the order in which it found them.
 #[derive(Default)]
-pub(super) struct Pile {
+pub(crate) struct Pile {
     /// `corners[start[i]..start[i + 1]]` are fragment `i`; none if the face is seen whole.
     start: Vec<u32>,
     corners: Vec<Corner>,
@@ -26,7 +25,7 @@ pub(super) struct Pile {
 
 /// Where the fragments of a face are.
 #[derive(Clone, Copy)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub face: FaceId,
     pile: u32,
     first: u32,
@@ -35,7 +34,7 @@ pub(super) struct Entry {
 
 /// All piles, and an entry for each face that is seen.
 #[derive(Default)]
-pub(super) struct Found {
+pub(crate) struct Found {
     piles: Vec<Pile>,
     pub entries: Vec<Entry>,
 }

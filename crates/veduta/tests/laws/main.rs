@@ -1,8 +1,11 @@
-//! The laws of visibility, on random scenes: area (law 1) and same bytes (law 5).
+//! The laws of visibility, on random scenes: area (law 1), merge (law 2, in `merge`) and same bytes
+//! (law 5).
 //!
 //! Every engine goes through the same scenes. A failing case prints its seed; set `VEDUTA_SEED` to
 //! look at that scene alone.
 
+mod merge;
+#[path = "../support/mod.rs"]
 mod support;
 
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
+use crate::MaterialId;
 use crate::scene::TexcoordSet;
 use std::ops::Range;
 use veduta_geometry::{DVec3, Vec2, Vec3};
-use veduta_map::MaterialId;
 
 /// Faces with shared vertices: triangles, or convex planar polygons given as fans of triangles.
 ///
@@ -127,12 +127,6 @@ impl Mesh {
     /// If there are fewer than three corners, or a corner has no position yet.
     pub fn push_polygon(&mut self, corners: &[u32]) {
         assert!(corners.len() >= 3, "a polygon has three corners at least");
-        if corners.len() > 3 && self.fans.is_empty() {
-            self.fans = (0..self.triangles.len() as u32).collect();
-        }
-        if corners.len() > 3 || !self.fans.is_empty() {
-            self.fans.push(self.triangles.len() as u32);
-        }
         let corner = |k: usize| corners[k % corners.len()];
         let area = |k: usize| {
             let [p, q, r] = [k, k + 1, k + 2].map(|k| self.positions[corner(k) as usize]);
@@ -149,9 +143,27 @@ impl Mesh {
             if area > best.1 { (k, area) } else { best }
         });
         let first = start.0;
-        for k in 1..corners.len() - 1 {
-            let triangle = [corner(first), corner(first + k), corner(first + k + 1)];
-            self.triangles.push(triangle);
+        self.push_fan(
+            &(first..first + corners.len())
+                .map(corner)
+                .collect::<Vec<_>>(),
+        );
+    }
+
+    /// Adds a convex planar polygon as one face, whose fan begins at its first corner.
+    ///
+    /// # Panics
+    /// If there are fewer than three corners.
+    pub fn push_fan(&mut self, corners: &[u32]) {
+        assert!(corners.len() >= 3, "a polygon has three corners at least");
+        if corners.len() > 3 && self.fans.is_empty() {
+            self.fans = (0..self.triangles.len() as u32).collect();
+        }
+        if corners.len() > 3 || !self.fans.is_empty() {
+            self.fans.push(self.triangles.len() as u32);
+        }
+        for pair in corners[1..].windows(2) {
+            self.triangles.push([corners[0], pair[0], pair[1]]);
         }
     }
 

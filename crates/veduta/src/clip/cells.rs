@@ -1,20 +1,22 @@
 //! Which faces may be seen, and in which cells they may hide others.
 
-use super::clip::Context;
+use super::clipper::Context;
 use super::grid::{CellSet, Extent};
-use super::guess::OPEN;
 use rayon::prelude::*;
 use veduta_map::FaceId;
 use wide::f32x8;
 
+/// The threshold of a cell in which nothing is guessed to be hidden.
+pub(crate) const OPEN: f32 = f32::NEG_INFINITY;
+
 /// How many faces are compared at once.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// The faces that are not guessed to be hidden in a cell, for every cell.
 ///
 /// Columns in cell order, so that a cell's extents are read as a stream; the bounds that `overlaps`
 /// compares are stored, and no more. Veils hide nothing and are not listed.
-pub(super) struct CellLists {
+pub(crate) struct CellLists {
     start: Vec<u32>,
     face: Vec<u32>,
     left: Vec<f32>,
@@ -44,7 +46,7 @@ fn reaches(nearness: f64, threshold: f32) -> bool {
 ///
 /// With the thresholds before they were lowered, and the cells in which they were: only what those
 /// left out and `thresholds` let in.
-pub(super) fn listed_between(
+pub(crate) fn listed_between(
     context: &Context,
     before: Option<(&[f32], &CellSet)>,
     thresholds: &[f32],
@@ -72,7 +74,39 @@ pub(super) fn listed_between(
     (faces, lists)
 }
 
+/// The faces that `wanted` accepts, in all cells that they touch.
+pub(crate) fn listed(context: &Context, wanted: impl Fn(FaceId) -> bool + Sync) -> CellLists {
+    let Context {
+        faces,
+        extents,
+        grid,
+    } = *context;
+    let count = faces.len();
+    let chunks: Vec<Chunk> = (0..count.div_ceil(FACES_PER_TASK))
+        .into_par_iter()
+        .map(|chunk| {
+            let range = chunk * FACES_PER_TASK..((chunk + 1) * FACES_PER_TASK).min(count);
+            let mut chunk = Chunk::default();
+            for (face, extent) in range.clone().zip(&extents[range]) {
+                let face = FaceId::from_index(face);
+                if !wanted(face) || faces.is_veil(face) {
+                    continue;
+                }
+                grid.each_row(faces.outline(face), extent, |row, columns| {
+                    let cells = columns.map(|column| grid.index(column, row) as u32);
+                    chunk.listed.extend(cells.map(|cell| (cell, face.0)));
+                    true
+                });
+            }
+            chunk
+        })
+        .collect();
+    let cells = grid.cells();
+    CellLists::gather(cells, &chunks, extents, vec![false; cells])
+}
+
 /// What one task lists.
+#[derive(Default)]
 struct Chunk {
     faces: Vec<FaceId>,
     /// `(cell, face)`, by face.
@@ -93,11 +127,7 @@ impl Chunk {
             extents,
             grid,
         } = *context;
-        let mut chunk = Self {
-            faces: Vec::new(),
-            listed: Vec::new(),
-            guessed: Vec::new(),
-        };
+        let mut chunk = Self::default();
         for index in range {
             let face = FaceId(index as u32);
             let extent = &extents[index];

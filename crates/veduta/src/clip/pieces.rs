@@ -14,7 +14,7 @@ const NEGLIGIBLE_AREA: f64 = 1e-18;
 
 /// A vertex of a piece, and what lies along the side from it to the next.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Corner {
+pub(crate) struct Corner {
     pub point: DVec2,
     pub side: Side,
 }
@@ -36,7 +36,7 @@ struct Piece {
 
 /// How an occluder lies to the face it may hide.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Depth {
+pub(crate) enum Depth {
     /// Behind it wherever they overlap.
     Behind,
     /// In front of it wherever they overlap.
@@ -47,13 +47,13 @@ pub(super) enum Depth {
 
 /// Value below which the difference of two planes counts as zero: its rounding error.
 #[inline(always)]
-pub(super) fn crossing_tolerance(difference: &Affine) -> f64 {
+pub(crate) fn crossing_tolerance(difference: &Affine) -> f64 {
     4e-16 * (difference.a.abs() + difference.b.abs() + difference.c.abs())
 }
 
 /// Pieces of one face.
 #[derive(Default)]
-pub(super) struct Pieces {
+pub(crate) struct Pieces {
     arena: Vec<Corner>,
     pieces: Vec<Piece>,
     next: Vec<Piece>,

@@ -7,7 +7,7 @@ use veduta_map::{FaceId, Faces};
 
 /// Bounds of a face in the image plane and of its nearness, rounded outwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Extent {
+pub(crate) struct Extent {
     pub x: [f32; 2],
     pub y: [f32; 2],
     pub nearness: [f32; 2],
@@ -60,7 +60,7 @@ impl Extent {
 
 /// A regular grid of cells over a strip of the frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     pub columns: u32,
     pub rows: u32,
     /// The strip's top in the image plane.
@@ -71,7 +71,7 @@ pub(super) struct Grid {
 
 /// Cells a face may touch: all of a box of cells.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Span {
+pub(crate) struct Span {
     pub columns: [u32; 2],
     pub rows: [u32; 2],
 }
@@ -84,7 +84,28 @@ impl Span {
     }
 }
 
+/// Faces for each cell, by default.
+const FACES_PER_CELL: f64 = 8.0;
+
 impl Grid {
+    /// A grid for `faces` faces in a strip of the frame, of cells that are about square; `cells` of them,
+    /// about, if told.
+    pub fn choose(faces: usize, aspect: f64, [top, bottom]: [f64; 2], cells: Option<u32>) -> Self {
+        let cells = cells.map_or_else(
+            || (faces as f64 / FACES_PER_CELL).clamp(1024.0, 1024.0 * 1024.0),
+            |cells| f64::from(cells.max(1)),
+        );
+        let height = bottom - top;
+        let columns = (cells * aspect / height).sqrt().round().clamp(1.0, 16384.0);
+        let rows = (cells / columns).round().clamp(1.0, 16384.0);
+        Self {
+            columns: columns as u32,
+            rows: rows as u32,
+            top,
+            height,
+        }
+    }
+
     pub fn cells(&self) -> usize {
         self.columns as usize * self.rows as usize
     }
@@ -200,7 +221,7 @@ impl Grid {
 }
 
 /// Some cells of a grid, and an answer to "is any of them in this box" that costs four look-ups.
-pub(super) struct CellSet {
+pub(crate) struct CellSet {
     columns: usize,
     marked: Vec<bool>,
     /// Number of marked cells above and left of each corner of cells.

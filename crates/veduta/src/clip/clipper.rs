@@ -13,14 +13,14 @@ use wide::f64x4;
 
 /// What all clips share.
 #[derive(Clone, Copy)]
-pub(super) struct Context<'a> {
+pub(crate) struct Context<'a> {
     pub faces: &'a Faces,
     pub extents: &'a [Extent],
     pub grid: &'a Grid,
 }
 
 /// Clips one face after the other; holds what is reused between them.
-pub(super) struct Clipper<'a> {
+pub(crate) struct Clipper<'a> {
     context: Context<'a>,
     pub pieces: Pieces,
     /// Whether a face in the same plane hid something of this one.

@@ -1,10 +1,11 @@
+use serde::{Deserialize, Serialize};
 use veduta_geometry::{DMat4, DVec3};
 
 /// A light of the scene.
 ///
 /// Photometric units, as in KHR_lights_punctual: the unit belongs to the colour (1, 1, 1), and each
 /// channel is scaled by its own factor.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Light {
     /// Name that no other light of the scene has.
     pub name: String,
@@ -17,7 +18,7 @@ pub struct Light {
 }
 
 /// What sends light out.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightKind {
     /// Parallel rays from infinitely far away, like the sun's.
     Directional {
@@ -29,6 +30,7 @@ pub enum LightKind {
         /// Luminous intensity in candela.
         intensity: f32,
         /// Distance in metres beyond which nothing is lit; infinite for none.
+        #[serde(with = "perhaps_infinite")]
         range: f32,
     },
     /// A point that shines into a cone.
@@ -36,6 +38,7 @@ pub enum LightKind {
         /// Luminous intensity within the inner cone, in candela.
         intensity: f32,
         /// Distance in metres beyond which nothing is lit; infinite for none.
+        #[serde(with = "perhaps_infinite")]
         range: f32,
         /// Angle in radians from the axis to where the light begins to fall off; at least 0.
         inner_angle: f32,
@@ -54,5 +57,18 @@ impl Light {
     /// Unit vector along which the light shines, in world space; of no meaning for a point.
     pub fn direction(&self) -> DVec3 {
         -self.world_from_light.z_axis.truncate()
+    }
+}
+
+/// JSON has no infinity: it is left out.
+mod perhaps_infinite {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(value: &f32, serializer: S) -> Result<S::Ok, S::Error> {
+        value.is_finite().then_some(value).serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+        Ok(Option::deserialize(deserializer)?.unwrap_or(f32::INFINITY))
     }
 }

@@ -1,4 +1,6 @@
+use crate::ObjectId;
 use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use veduta_geometry::DVec3;
 
@@ -6,7 +8,7 @@ use veduta_geometry::DVec3;
 ///
 /// Georeferenced coordinates are large: metres from an origin far away. They are taken relative to
 /// [`World::origin`] in double precision before anything else is done with them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct World {
     /// Coordinate reference system, such as `EPSG:7415`; `None` for a scene that is nowhere.
     pub crs: Option<String>,
@@ -17,7 +19,7 @@ pub struct World {
 }
 
 /// A part of a scene that can be made apart from the others and composited with them.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layer {
     /// Its name, with which the names of its objects and materials begin.
     pub name: String,
@@ -29,6 +31,16 @@ pub struct Layer {
 }
 
 impl Scene {
+    /// The layer of an object, if it is of one.
+    pub fn layer_of(&self, object: ObjectId) -> Option<&Layer> {
+        // Layers stand in the order of their objects.
+        let next = self
+            .layers
+            .partition_point(|layer| layer.objects.end <= object.0);
+        let layer = self.layers.get(next)?;
+        layer.objects.contains(&object.0).then_some(layer)
+    }
+
     /// Leaves out the objects of all layers but those that `keep` accepts. Objects of no layer stay.
     ///
     /// Meshes, materials, cameras and lights stay as they are: what is left looks as it does among

@@ -1,8 +1,9 @@
 use crate::scene::ImageId;
+use serde::{Deserialize, Serialize};
 use veduta_geometry::Vec2;
 
 /// How a surface looks. Colours are linear Rec.709.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// Name from the model.
     pub name: String,
@@ -39,7 +40,7 @@ impl Default for Material {
 }
 
 /// What a material's opacity means.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum AlphaMode {
     /// Opacity is ignored.
     #[default]
@@ -51,7 +52,7 @@ pub enum AlphaMode {
 }
 
 /// A picture laid on a surface by its texture coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TextureRef {
     /// The picture.
     pub image: ImageId,
@@ -82,7 +83,7 @@ impl TextureRef {
 }
 
 /// One of a mesh's tables of texture coordinates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TexcoordSet {
     /// [`Mesh::texcoords`](crate::scene::Mesh::texcoords).
     #[default]
@@ -92,7 +93,7 @@ pub enum TexcoordSet {
 }
 
 /// What lies outside a texture's unit square.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wrap {
     /// The picture again.
     #[default]

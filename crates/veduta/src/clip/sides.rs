@@ -11,14 +11,14 @@ use wide::f64x4;
 /// Points constructed on a line miss it by a few units of 2^-53. Without this band every such miss
 /// would cut off a sliver; the area it can misplace is its width times a line's length in a pixel,
 /// 2e-12 pixels at 2000 pixels across.
-pub(super) const ON_LINE: f64 = 1e-15;
+pub(crate) const ON_LINE: f64 = 1e-15;
 
 /// Lanes of a group.
-pub(super) const LANES: usize = 4;
+pub(crate) const LANES: usize = 4;
 
 /// Some consecutive sides of a positively wound outline.
 #[derive(Clone, Copy)]
-pub(super) struct Sides {
+pub(crate) struct Sides {
     start: [f64x4; 2],
     direction: [f64x4; 2],
     /// [`ON_LINE`] in units of [`Sides::inside`].
@@ -96,7 +96,7 @@ impl Sides {
 }
 
 /// Whether a side of `outline` after its first four separates it from `points`.
-pub(super) fn later_sides_separate(outline: &[DVec2], points: &[DVec2]) -> bool {
+pub(crate) fn later_sides_separate(outline: &[DVec2], points: &[DVec2]) -> bool {
     (LANES..outline.len())
         .step_by(LANES)
         .any(|first| Sides::group(outline, first).separate(points))

@@ -1,0 +1,131 @@
+//! `veduta composite`: several stored maps become one.
+
+use super::look::Look;
+use super::output::Output;
+use super::stored::{Changes, open, refuse_place, summary, tell_work};
+use super::tell_shortcomings;
+use crate::exit::{Code, Failure};
+use crate::talk::{Talk, print};
+use clap::Args;
+use std::path::PathBuf;
+use veduta::composite::{CompositeError, composite};
+use veduta::map::SeenScene;
+use veduta::map::file::Source;
+use veduta::pipeline::{self, RenderSettings};
+use veduta_io::write_map;
+
+/// Put stored maps together by depth
+///
+/// Maps of one camera become one map, or a picture of it: what is nearer hides what is farther, also
+/// where surfaces pass through one another, with edges as exact as if all had been rendered together.
+/// Of surfaces in one plane that of the higher priority is seen, else that of the first name.
+#[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Composite {
+    /// The maps: .veduta
+    #[arg(required = true, value_name = "MAP")]
+    maps: Vec<PathBuf>,
+    /// Make every warning an error
+    #[arg(long)]
+    strict: bool,
+
+    #[command(flatten)]
+    changes: Changes,
+    #[command(flatten)]
+    output: Output,
+    #[command(flatten)]
+    look: Look,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  A pavilion into a town, both seen by one camera:
+      veduta render town.obj --eye 40,-60,25 -o town.veduta
+      veduta render pavilion.obj --eye 40,-60,25 --look-at 0,0,4 -o pavilion.veduta
+      veduta composite town.veduta pavilion.veduta -o both.veduta
+      veduta composite town.veduta pavilion.veduta -o both.png
+";
+
+impl Composite {
+    pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        let map_place = self.output.map_place();
+        let target = match map_place {
+            Some(place) => {
+                refuse_place(place, force)?;
+                None
+            }
+            None => self.output.target(json)?,
+        };
+        if map_place.is_none() && target.is_none() {
+            let message = "a composite is shown by -o FILE; --preview is for veduta render";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let mut maps: Vec<SeenScene> = Vec::new();
+        let mut sources: Vec<Source> = Vec::new();
+        talk.begin("reading");
+        for (index, path) in self.maps.iter().enumerate() {
+            talk.part(index, self.maps.len());
+            let mut map = open(path)?;
+            for source in map.reader().sources() {
+                if !sources.contains(source) {
+                    sources.push(source.clone());
+                }
+            }
+            maps.push(map.read(|reader| reader.read())?);
+        }
+        talk.begin("compositing");
+        let mut seen = composite(&maps).map_err(|error| self.refusal(&error))?;
+        self.changes.apply(&mut seen.scene, self.strict, talk)?;
+        let mut told = serde_json::json!({
+            "size": seen.size,
+            "maps": maps.len(),
+            "facesSeen": seen.map.faces.len(),
+        });
+        if let Some(place) = map_place {
+            talk.begin("writing");
+            write_map(place, &seen, &sources)?;
+            told["output"] = place.to_string_lossy().into();
+        }
+        if let Some(target) = &target {
+            let [width, height] = seen.size;
+            let development = self.look.development(&seen.scene, self.strict, talk)?;
+            let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
+            tell_shortcomings(&self.maps[0], &seen.scene, &shortcomings, self.strict, talk)?;
+            talk.begin("shading");
+            let settings = RenderSettings {
+                width,
+                height,
+                unlit: self.look.unlit,
+                ..RenderSettings::default()
+            };
+            let mut picture = pipeline::render_map(&seen.scene, &seen.map, &settings);
+            talk.begin("developing");
+            told["exposure"] = development.develop(&mut picture, !target.linear).into();
+            talk.begin("writing");
+            target.write(&picture)?;
+            told["output"] = target.name().into();
+        }
+        talk.end();
+        talk.detail(format_args!("{}", summary(&seen)));
+        if json {
+            told["warnings"] = talk.warnings().into();
+            tell_work(&mut told);
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// What is wrong, with the names of the files.
+    fn refusal(&self, error: &CompositeError) -> Failure {
+        let message = match error {
+            CompositeError::OtherCamera { index, difference }
+            | CompositeError::OtherWorld { index, difference } => format!(
+                "{}: cannot be composited with {}: {difference}",
+                self.maps[*index].display(),
+                self.maps[0].display()
+            ),
+            other => other.to_string(),
+        };
+        Failure::new(Code::BadInput, message)
+    }
+}

@@ -1,0 +1,132 @@
+//! `manifest.json`: what is in a file and where, written last.
+
+use super::FileError;
+use crate::Camera;
+use crate::scene::{Layer, Light, Material, World};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::{self, Read};
+use xxhash_rust::xxh3::Xxh3;
+
+/// Name of the member.
+pub const MANIFEST: &str = "manifest.json";
+
+/// What the format calls itself.
+pub const FORMAT: &str = "veduta visibility map";
+
+/// Major version: readers refuse others. Minor version: readers skip what they do not know.
+pub const VERSION: [u32; 2] = [1, 0];
+
+/// The manifest. Fields that a reader does not know are skipped.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    pub format: String,
+    /// Major and minor version.
+    pub version: [u32; 2],
+    /// The program that wrote the file.
+    pub generator: String,
+    /// Pixels of the picture it was made for; a map has no resolution.
+    pub size: [u32; 2],
+    pub camera: Camera,
+    pub world: World,
+    pub layers: Vec<Layer>,
+    pub lights: Vec<Light>,
+    pub materials: Vec<Material>,
+    pub sources: Vec<Source>,
+    /// Boxes around what the tiles' faces show: left, top, right, bottom, in the image plane. Tile `i`
+    /// is batch `i` of the members that are cut into tiles.
+    pub tiles: Vec<[f64; 4]>,
+    /// Of each member that holds a table, by name.
+    pub tables: BTreeMap<String, Table>,
+}
+
+/// A file that the scene was read from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Source {
+    /// As it was named; relative to the map where it can be.
+    pub path: String,
+    /// Number of bytes.
+    pub length: u64,
+    /// XXH3 of the bytes, 128 bits, hexadecimal.
+    pub xxh3: String,
+}
+
+impl Source {
+    /// What is to be said of a file with these contents.
+    ///
+    /// # Errors
+    /// Those of `contents`.
+    pub fn of(path: &str, mut contents: impl Read) -> io::Result<Self> {
+        let mut checksum = Xxh3::new();
+        let mut length = 0;
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            let read = contents.read(&mut buffer)?;
+            if read == 0 {
+                break;
+            }
+            checksum.update(&buffer[..read]);
+            length += read as u64;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            length,
+            xxh3: format!("{:032x}", checksum.digest128()),
+        })
+    }
+}
+
+/// Where the batches of a table lie, and their checksums. A table's bytes are its head (Arrow's schema),
+/// the batches and its tail (Arrow's footer), one after the other.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    pub head: Segment,
+    pub batches: Vec<Segment>,
+    pub tail: Segment,
+}
+
+/// Bytes of a member.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Segment {
+    /// Number of bytes.
+    pub length: u64,
+    /// XXH3 of the bytes, 64 bits, hexadecimal.
+    pub xxh3: String,
+}
+
+impl Segment {
+    /// The segment of these bytes.
+    pub fn of(bytes: &[u8]) -> Self {
+        Self {
+            length: bytes.len() as u64,
+            xxh3: format!("{:016x}", xxhash_rust::xxh3::xxh3_64(bytes)),
+        }
+    }
+}
+
+impl Manifest {
+    /// Reads a manifest, the version first: of another one nothing else is known.
+    pub fn parse(bytes: &[u8]) -> Result<Self, FileError> {
+        #[derive(Deserialize)]
+        struct Versioned {
+            format: String,
+            version: [u32; 2],
+        }
+        let unsound = |error: serde_json::Error| FileError::Unsound {
+            member: MANIFEST.into(),
+            what: error.to_string(),
+        };
+        let Versioned { format, version } = serde_json::from_slice(bytes).map_err(unsound)?;
+        if format != FORMAT {
+            let what = format!("the format is {format:?}, not {FORMAT:?}");
+            return Err(FileError::Unsound {
+                member: MANIFEST.into(),
+                what,
+            });
+        }
+        if version[0] != VERSION[0] {
+            return Err(FileError::Version { found: version });
+        }
+        serde_json::from_slice(bytes).map_err(unsound)
+    }
+}

@@ -1,0 +1,517 @@
+//! A file -> a seen scene, whole or a window of it.
+
+use super::FileError;
+use super::container::{ArchiveReader, Member};
+use super::manifest::{MANIFEST, Manifest, Segment, Source, Table};
+use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
+use crate::scene::{Mesh, MeshId, Object, Scene};
+use crate::{
+    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, SeenScene, Side, VisibilityMap,
+};
+use arrow_array::RecordBatch;
+use arrow_ipc::reader::FileDecoder;
+use arrow_ipc::{Block, MetadataVersion};
+use arrow_schema::SchemaRef;
+use std::collections::BTreeMap;
+use std::io::{Read, Seek};
+use std::sync::Arc;
+use veduta_geometry::{Affine, DVec2};
+
+/// Reads a file, all of it or what a window needs.
+#[derive(Debug)]
+pub struct MapReader<R> {
+    archive: ArchiveReader<R>,
+    manifest: Manifest,
+}
+
+impl<R: Read + Seek> MapReader<R> {
+    /// Reads what is in the file and where; checks all but the tables.
+    ///
+    /// # Errors
+    /// [`FileError`].
+    pub fn new(input: R) -> Result<Self, FileError> {
+        let mut archive = ArchiveReader::new(input)?;
+        let Some(member) = archive.member(MANIFEST).cloned() else {
+            return Err(FileError::unsound(
+                "the archive",
+                format!("no {MANIFEST} is in it"),
+            ));
+        };
+        archive.check(&member)?;
+        let bytes = archive.bytes(MANIFEST, member.start(), member.length)?;
+        let manifest = Manifest::parse(&bytes)?;
+        let reader = Self { archive, manifest };
+        reader.check_manifest()?;
+        Ok(reader)
+    }
+
+    fn check_manifest(&self) -> Result<(), FileError> {
+        let unsound = |what: String| Err(FileError::unsound(MANIFEST, what));
+        for member in self.archive.members() {
+            let Some(table) = self.manifest.tables.get(&member.name) else {
+                if member.name == MANIFEST {
+                    continue;
+                }
+                return unsound(format!("does not tell of the member {}", member.name));
+            };
+            let lengths = table.segments().map(|segment| segment.length);
+            let sum = lengths.fold(0, u64::saturating_add);
+            if sum != member.length {
+                return unsound(format!("the parts of {} are not all of it", member.name));
+            }
+        }
+        for table in TableName::ALL {
+            let name = table.member();
+            let (Some(_), Some(found)) =
+                (self.archive.member(name), self.manifest.tables.get(name))
+            else {
+                return unsound(format!("{name} is missing"));
+            };
+            let of_tiles = TableName::OF_TILES.contains(&table);
+            if of_tiles && found.batches.len() != self.manifest.tiles.len() {
+                return unsound(format!("{name} does not have a batch for each tile"));
+            }
+        }
+        if self.manifest.size.contains(&0) {
+            return unsound("the picture has no pixels".into());
+        }
+        Ok(())
+    }
+
+    /// Pixels of the picture that the map was made for.
+    pub fn size(&self) -> [u32; 2] {
+        self.manifest.size
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.manifest.camera
+    }
+
+    /// The program that wrote the file.
+    pub fn generator(&self) -> &str {
+        &self.manifest.generator
+    }
+
+    /// The files that the scene was read from.
+    pub fn sources(&self) -> &[Source] {
+        &self.manifest.sources
+    }
+
+    /// Bytes read so far.
+    pub fn bytes_read(&self) -> u64 {
+        self.archive.bytes_read()
+    }
+
+    /// Reads all that is seen.
+    ///
+    /// # Errors
+    /// [`FileError`].
+    pub fn read(&mut self) -> Result<SeenScene, FileError> {
+        self.read_tiles(0..self.manifest.tiles.len())
+    }
+
+    /// Reads what is seen in a window of the image plane, from its left top corner to its right bottom
+    /// one, and some of what is seen around it.
+    ///
+    /// # Errors
+    /// [`FileError`].
+    pub fn read_window(&mut self, [min, max]: [DVec2; 2]) -> Result<SeenScene, FileError> {
+        let touches = |&[left, top, right, bottom]: &[f64; 4]| {
+            left <= max.x && right >= min.x && top <= max.y && bottom >= min.y
+        };
+        let tiles: Vec<usize> = (0..self.manifest.tiles.len())
+            .filter(|&tile| touches(&self.manifest.tiles[tile]))
+            .collect();
+        let seen = self.read_tiles(tiles.into_iter())?;
+        // Objects and materials of which nothing was read are left out.
+        Ok(SeenScene::of(&seen.scene, &seen.map, seen.size))
+    }
+
+    /// Reads every byte and checks the invariants of what is read.
+    ///
+    /// # Errors
+    /// [`FileError`], or what the map itself has against it.
+    pub fn check(&mut self) -> Result<SeenScene, FileError> {
+        for member in self.archive.members().to_vec() {
+            self.archive.check(&member)?;
+        }
+        for table in TableName::ALL {
+            let (_, member, found) = self.table(table)?;
+            let (start, head) = (member.start(), found.head.clone());
+            self.segment(table, start, &head)?;
+        }
+        let seen = self.read()?;
+        let sound = seen.map.check();
+        sound.map_err(|invariant| FileError::unsound("the map", invariant.to_string()))?;
+        Ok(seen)
+    }
+
+    fn read_tiles(&mut self, tiles: impl Iterator<Item = usize>) -> Result<SeenScene, FileError> {
+        let mut rows = SeenRows::default();
+        let mut of_tiles = Vec::new();
+        for table in TableName::OF_TILES {
+            of_tiles.push(TableReader::new(self, table)?);
+        }
+        for tile in tiles {
+            let mut batches = Vec::with_capacity(of_tiles.len());
+            for table in &of_tiles {
+                batches.push(table.batch(self, tile)?);
+            }
+            let of = |table: TableName| Rows {
+                batch: &batches[table as usize],
+                member: table.member(),
+                index: tile,
+            };
+            let points = of(TableName::Points).points()?;
+            rows.faces.extend(of(TableName::Faces).faces(&points)?);
+            rows.vertices.extend(of(TableName::Vertices).vertices()?);
+            rows.opaque
+                .extend(of(TableName::Opaque).fragments(&points)?);
+            rows.veils.extend(of(TableName::Veils).fragments(&points)?);
+        }
+        let mut scene = Scene {
+            materials: self.manifest.materials.clone(),
+            lights: self.manifest.lights.clone(),
+            layers: self.manifest.layers.clone(),
+            world: self.manifest.world.clone(),
+            ..Scene::default()
+        };
+        self.read_all(TableName::Images, |batch| {
+            scene.images.push(batch.image()?);
+            Ok(())
+        })?;
+        self.read_all(TableName::Objects, |batch| {
+            for (name, world_from_object) in batch.objects()? {
+                let mesh = MeshId(scene.objects.len() as u32);
+                scene.objects.push(Object {
+                    name,
+                    mesh,
+                    world_from_object,
+                });
+            }
+            Ok(())
+        })?;
+        check_scene(&scene)?;
+        rows.into_seen(scene, &self.manifest)
+    }
+
+    fn read_all(
+        &mut self,
+        table: TableName,
+        mut take: impl FnMut(Rows) -> Result<(), FileError>,
+    ) -> Result<(), FileError> {
+        let reader = TableReader::new(self, table)?;
+        for index in 0..reader.starts.len() {
+            take(Rows {
+                batch: &reader.batch(self, index)?,
+                member: table.member(),
+                index,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// A table's member and where its batches lie. That it is there was checked.
+    fn table(&self, name: TableName) -> Result<(TableName, &Member, &Table), FileError> {
+        let member = self.archive.member(name.member());
+        let table = self.manifest.tables.get(name.member());
+        let both = member.zip(table);
+        let (member, table) =
+            both.ok_or_else(|| FileError::unsound(name.member(), "is missing"))?;
+        Ok((name, member, table))
+    }
+
+    /// The bytes of a part of a table, which are those that were written.
+    fn segment(
+        &mut self,
+        table: TableName,
+        start: u64,
+        segment: &Segment,
+    ) -> Result<Vec<u8>, FileError> {
+        let bytes = self.archive.bytes(table.member(), start, segment.length)?;
+        if Segment::of(&bytes) == *segment {
+            Ok(bytes)
+        } else {
+            Err(FileError::Damaged {
+                what: table.member().into(),
+                offset: start,
+            })
+        }
+    }
+}
+
+impl Table {
+    fn segments(&self) -> impl Iterator<Item = &Segment> {
+        [&self.head]
+            .into_iter()
+            .chain(&self.batches)
+            .chain([&self.tail])
+    }
+}
+
+/// A table whose tail was read, in which its schema stands.
+struct TableReader {
+    name: TableName,
+    decoder: FileDecoder,
+    /// Where each batch begins, and what its bytes are.
+    starts: Vec<(u64, Segment)>,
+}
+
+/// Bytes that head a message of Arrow.
+const MESSAGE_PREFIX: usize = 8;
+
+impl TableReader {
+    fn new<R: Read + Seek>(reader: &mut MapReader<R>, name: TableName) -> Result<Self, FileError> {
+        let (_, member, table) = reader.table(name)?;
+        let (start, end, table) = (member.start(), member.end(), table.clone());
+        let tail = reader.segment(name, end - table.tail.length, &table.tail)?;
+        let schema = schema_of(&tail)
+            .ok_or_else(|| FileError::unsound(name.member(), "does not end with a schema"))?;
+        let mut next = start + table.head.length;
+        let starts = table.batches.into_iter().map(|segment| {
+            let start = next;
+            next += segment.length;
+            (start, segment)
+        });
+        Ok(Self {
+            name,
+            starts: starts.collect(),
+            decoder: FileDecoder::new(schema, MetadataVersion::V5),
+        })
+    }
+
+    fn batch<R: Read + Seek>(
+        &self,
+        reader: &mut MapReader<R>,
+        index: usize,
+    ) -> Result<RecordBatch, FileError> {
+        let (start, segment) = &self.starts[index];
+        let bytes = reader.segment(self.name, *start, segment)?;
+        let no_batch = || FileError::unsound(self.name.member(), format!("batch {index} is none"));
+        let metadata = bytes.get(4..8).and_then(|length| length.try_into().ok());
+        let metadata = metadata.map(i32::from_le_bytes).ok_or_else(no_batch)?;
+        let metadata = usize::try_from(metadata).map_err(|_| no_batch())? + MESSAGE_PREFIX;
+        if metadata > bytes.len() {
+            return Err(no_batch());
+        }
+        let block = Block::new(0, metadata as i32, (bytes.len() - metadata) as i64);
+        let batch = self.decoder.read_record_batch(&block, &bytes.into());
+        let batch =
+            batch.map_err(|error| FileError::unsound(self.name.member(), error.to_string()))?;
+        batch.ok_or_else(no_batch)
+    }
+}
+
+/// The schema in the tail of an Arrow IPC file.
+fn schema_of(tail: &[u8]) -> Option<SchemaRef> {
+    let (rest, end) = tail.split_last_chunk::<10>()?;
+    let length = arrow_ipc::reader::read_footer_length(*end).ok()?;
+    let footer = &rest[rest.len().checked_sub(length)?..];
+    let schema = arrow_ipc::root_as_footer(footer).ok()?.schema()?;
+    arrow_ipc::convert::try_fb_to_schema(schema)
+        .ok()
+        .map(Arc::new)
+}
+
+/// What the manifest and the small tables name must be there.
+fn check_scene(scene: &Scene) -> Result<(), FileError> {
+    let unsound = |what: String| Err(FileError::unsound(MANIFEST, what));
+    let objects = scene.objects.len() as u32;
+    for layer in &scene.layers {
+        if layer.objects.start > layer.objects.end || layer.objects.end > objects {
+            return unsound(format!(
+                "the layer {:?} has objects that are not there",
+                layer.name
+            ));
+        }
+    }
+    for material in &scene.materials {
+        let textures = [material.base_color_texture, material.emissive_texture];
+        for texture in textures.into_iter().flatten() {
+            if texture.image.0 as usize >= scene.images.len() {
+                let name = &material.name;
+                return unsound(format!(
+                    "the material {name:?} has an image that is not there"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Rows of the tiles that were read.
+#[derive(Default)]
+struct SeenRows {
+    faces: Vec<FaceRow>,
+    vertices: Vec<VertexRow>,
+    opaque: Vec<FragmentRow>,
+    veils: Vec<FragmentRow>,
+}
+
+impl SeenRows {
+    fn into_seen(mut self, mut scene: Scene, manifest: &Manifest) -> Result<SeenScene, FileError> {
+        // A face stands in each tile that names it, and its vertices with it.
+        self.faces.sort_by_key(|row| row.face);
+        self.faces.dedup();
+        self.vertices.sort_by_key(|row| (row.object, row.vertex));
+        self.vertices.dedup();
+        let faces = TableName::Faces.member();
+        let twice = |what: &str, number: u32| {
+            FileError::unsound(faces, format!("{what} {number} is told twice, differently"))
+        };
+        if let Some(pair) = self
+            .faces
+            .windows(2)
+            .find(|pair| pair[0].face == pair[1].face)
+        {
+            return Err(twice("face", pair[0].face));
+        }
+        let key = |row: &VertexRow| (row.object, row.vertex);
+        if let Some(pair) = self
+            .vertices
+            .windows(2)
+            .find(|pair| key(&pair[0]) == key(&pair[1]))
+        {
+            return Err(twice("vertex", pair[0].vertex));
+        }
+
+        scene.meshes = vec![Mesh::default(); scene.objects.len()];
+        for row in &self.vertices {
+            let mesh = scene.meshes.get_mut(row.object as usize);
+            if !mesh.is_some_and(|mesh| row.push_to(mesh)) {
+                let what = format!(
+                    "vertex {} of object {} does not fit",
+                    row.vertex, row.object
+                );
+                return Err(FileError::unsound(TableName::Vertices.member(), what));
+            }
+        }
+        let table = self.face_table(&mut scene)?;
+        for mesh in scene.meshes.iter().filter(|mesh| mesh.face_count() > 0) {
+            let sound = mesh.check();
+            sound.map_err(|error| FileError::unsound(faces, error.to_string()))?;
+        }
+        let numbers: Vec<u32> = self.faces.iter().map(|row| row.face).collect();
+        let new_id = |face: u32| numbers.binary_search(&face).ok().map(FaceId::from_index);
+        Ok(SeenScene {
+            map: VisibilityMap {
+                camera: manifest.camera,
+                opaque: fragments(self.opaque, TableName::Opaque, &table, false, new_id)?,
+                veils: fragments(self.veils, TableName::Veils, &table, true, new_id)?,
+                faces: table,
+            },
+            scene,
+            size: manifest.size,
+        })
+    }
+
+    /// The faces in their order, numbered anew; they are added to the meshes of their objects.
+    fn face_table(&self, scene: &mut Scene) -> Result<Faces, FileError> {
+        let unsound = |what: String| FileError::unsound(TableName::Faces.member(), what);
+        let mut table = Faces::with_capacity(self.faces.len());
+        let mut planes: BTreeMap<u32, Affine> = BTreeMap::new();
+        for row in &self.faces {
+            if *planes.entry(row.plane).or_insert(row.nearness) != row.nearness {
+                return Err(unsound(format!(
+                    "plane {} is told twice, differently",
+                    row.plane
+                )));
+            }
+        }
+        let planes: BTreeMap<u32, PlaneId> = planes
+            .into_iter()
+            .map(|(plane, nearness)| (plane, table.push_plane(nearness)))
+            .collect();
+        for row in &self.faces {
+            let misfit = |what: &str| unsound(format!("face {}: {what}", row.face));
+            if row.material as usize >= scene.materials.len() {
+                return Err(misfit("its material is not there"));
+            }
+            let mesh = scene.meshes.get_mut(row.object as usize);
+            let mesh = mesh.ok_or_else(|| misfit("its object is not there"))?;
+            // Vertices ascend, and those of the faces at hand were read with them.
+            let of_object = self.vertices.partition_point(|v| v.object < row.object);
+            let of_object = &self.vertices[of_object..];
+            let corner = |&vertex: &u32| {
+                let row_of = |v: &VertexRow| (v.object, v.vertex);
+                let found = of_object.binary_search_by_key(&(row.object, vertex), row_of);
+                found.ok().map(|index| index as u32)
+            };
+            let corners: Option<Vec<u32>> = row.corners.iter().map(corner).collect();
+            let corners = corners.filter(|corners| corners.len() >= 3);
+            let corners = corners.ok_or_else(|| misfit("its corners are not there"))?;
+            let source = mesh.face_count() as u32;
+            mesh.push_fan(&corners);
+            let material = MaterialId(row.material);
+            if mesh.materials.last().is_none_or(|last| last.1 != material) {
+                mesh.materials.push((source, material));
+            }
+            if row.outline.len() < 3 {
+                return Err(misfit("its outline is not a polygon"));
+            }
+            let object = ObjectId(row.object);
+            let id = table.push(&row.outline, planes[&row.plane], object, source);
+            let id = id.ok_or_else(|| misfit("its outline has no area"))?;
+            if !row.opaque {
+                table.set_veil(id);
+            }
+        }
+        Ok(table)
+    }
+}
+
+/// Fragments in the order of their faces.
+fn fragments(
+    mut rows: Vec<FragmentRow>,
+    name: TableName,
+    faces: &Faces,
+    veils: bool,
+    new_id: impl Fn(u32) -> Option<FaceId>,
+) -> Result<Fragments, FileError> {
+    let unsound = |what: String| FileError::unsound(name.member(), what);
+    // All fragments of a face stand in one tile, in order.
+    rows.sort_by_key(|row| row.face);
+    let mut fragments = Fragments::new();
+    let mut last: Option<(FaceId, bool)> = None;
+    for row in &rows {
+        let missing = || unsound(format!("face {} is not there", row.face));
+        let face = new_id(row.face).ok_or_else(missing)?;
+        if faces.is_veil(face) != veils {
+            return Err(unsound(format!(
+                "face {} belongs to the other table",
+                row.face
+            )));
+        }
+        let whole = row.vertices.is_empty();
+        if last.is_some_and(|(before, was_whole)| before == face && (whole || was_whole)) {
+            return Err(unsound(format!(
+                "face {} is seen whole and again",
+                row.face
+            )));
+        }
+        last = Some((face, whole));
+        if whole {
+            fragments.push_whole(face);
+            continue;
+        }
+        let mut sides = Vec::with_capacity(row.sides.len());
+        for side in &row.sides {
+            let cutter = new_id(side.face.0).ok_or_else(missing)?;
+            let is_kind =
+                side.kind >= Side::SCAN || (side.kind as usize) < faces.outline(cutter).len();
+            if !is_kind {
+                return Err(unsound(format!(
+                    "face {} has no side {}",
+                    side.face.0, side.kind
+                )));
+            }
+            sides.push(Side {
+                face: cutter,
+                ..*side
+            });
+        }
+        fragments.push_cut(face, row.vertices.iter().copied().zip(sides));
+    }
+    Ok(fragments)
+}

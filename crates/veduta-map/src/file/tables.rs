@@ -1,0 +1,608 @@
+//! The tables of a file: their columns, and rows <-> batches.
+
+use super::FileError;
+use super::tiles::Tile;
+use crate::scene::{Image, Mesh, Object, Scene};
+use crate::{FaceId, Fragment, Fragments, ObjectId, Side, VisibilityMap};
+use arrow_array::builder::{FixedSizeListBuilder, Float64Builder, ListBuilder, UInt32Builder};
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float32Type, Float64Type, UInt32Type};
+use arrow_array::{
+    Array, ArrayRef, BooleanArray, Float32Array, Float64Array, LargeBinaryArray, ListArray,
+    RecordBatch, StringArray, UInt32Array,
+};
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+use std::collections::HashMap;
+use std::sync::Arc;
+use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
+
+/// A member that holds a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableName {
+    /// Points of the image plane, by tile.
+    Points,
+    /// Corners of faces in their object's space, by tile.
+    Vertices,
+    /// Faces, by tile.
+    Faces,
+    /// Where opaque faces are seen, by tile.
+    Opaque,
+    /// Where faces that are not fully opaque are seen, by tile.
+    Veils,
+    /// Objects.
+    Objects,
+    /// Pictures, each a batch.
+    Images,
+}
+
+use TableName::{Faces, Images, Objects, Opaque, Points, Veils, Vertices};
+
+impl TableName {
+    /// Tables whose batches are tiles, in the order in which they stand in a file.
+    pub const OF_TILES: [Self; 5] = [Points, Vertices, Faces, Opaque, Veils];
+
+    pub const ALL: [Self; 7] = [Points, Vertices, Faces, Opaque, Veils, Objects, Images];
+
+    /// Name of the member.
+    pub fn member(self) -> &'static str {
+        match self {
+            Points => "points.arrow",
+            Vertices => "vertices.arrow",
+            Faces => "faces.arrow",
+            Opaque => "opaque.arrow",
+            Veils => "veils.arrow",
+            Objects => "objects.arrow",
+            Images => "images.arrow",
+        }
+    }
+
+    pub fn schema(self) -> Schema {
+        let number = |name: &str| Field::new(name, DataType::UInt32, false);
+        let real = |name: &str| Field::new(name, DataType::Float64, false);
+        let short = |name: &str| Field::new(name, DataType::Float32, true);
+        let numbers = |name: &str| Field::new(name, list_of(DataType::UInt32), false);
+        let fields = match self {
+            Points => vec![real("x"), real("y")],
+            Vertices => {
+                let mut fields = vec![number("object"), number("vertex")];
+                fields.extend(["x", "y", "z"].map(real));
+                fields.extend(ATTRIBUTES.iter().copied().map(short));
+                fields
+            }
+            Faces => vec![
+                number("face"),
+                number("object"),
+                number("material"),
+                Field::new("opaque", DataType::Boolean, false),
+                number("plane"),
+                real("a"),
+                real("b"),
+                real("c"),
+                numbers("outline"),
+                numbers("corners"),
+            ],
+            Opaque | Veils => vec![
+                number("face"),
+                numbers("outline"),
+                numbers("side_face"),
+                numbers("side_kind"),
+            ],
+            Objects => vec![
+                Field::new("name", DataType::Utf8, false),
+                Field::new("world_from_object", matrix_type(), false),
+            ],
+            Images => vec![
+                Field::new("name", DataType::Utf8, false),
+                number("width"),
+                number("height"),
+                Field::new("rgba", DataType::LargeBinary, false),
+            ],
+        };
+        Schema::new(fields)
+    }
+
+    fn batch(self, columns: Vec<ArrayRef>) -> RecordBatch {
+        RecordBatch::try_new(Arc::new(self.schema()), columns)
+            .expect("columns are as the schema says")
+    }
+}
+
+/// Columns of vertices that are empty where the mesh has no such attribute.
+const ATTRIBUTES: [&str; 11] = [
+    "nx", "ny", "nz", "u", "v", "u2", "v2", "r", "g", "b", "opacity",
+];
+
+fn list_of(values: DataType) -> DataType {
+    DataType::List(Arc::new(Field::new_list_field(values, false)))
+}
+
+fn matrix_type() -> DataType {
+    DataType::FixedSizeList(
+        Arc::new(Field::new_list_field(DataType::Float64, false)),
+        16,
+    )
+}
+
+/// Lists of numbers, one after the other.
+struct Lists(ListBuilder<UInt32Builder>);
+
+impl Lists {
+    fn new() -> Self {
+        let field = Field::new_list_field(DataType::UInt32, false);
+        Self(ListBuilder::new(UInt32Builder::new()).with_field(field))
+    }
+
+    fn push(&mut self, numbers: impl Iterator<Item = u32>) {
+        self.0.append_value(numbers.map(Some));
+    }
+
+    fn finish(mut self) -> ArrayRef {
+        Arc::new(self.0.finish())
+    }
+}
+
+/// A tile's tables, which name each other's rows.
+pub struct TileBatches {
+    batches: [RecordBatch; 5],
+}
+
+impl TileBatches {
+    pub fn new(map: &VisibilityMap, scene: &Scene, tile: &Tile) -> Self {
+        let named = tile.faces_named(map);
+        let mut points = PointRows::default();
+        let faces = face_rows(map, scene, &named, &mut points);
+        let opaque = fragment_rows(Opaque, &map.opaque, &tile.opaque, &mut points);
+        let veils = fragment_rows(Veils, &map.veils, &tile.veils, &mut points);
+        let vertices = vertex_rows(map, scene, &named);
+        Self {
+            batches: [points.finish(), vertices, faces, opaque, veils],
+        }
+    }
+
+    pub fn of(&self, table: TableName) -> &RecordBatch {
+        &self.batches[table as usize]
+    }
+}
+
+/// Points of the image plane, each once: neighbours name the same.
+#[derive(Default)]
+struct PointRows {
+    points: Vec<DVec2>,
+    rows: HashMap<[u64; 2], u32>,
+}
+
+impl PointRows {
+    fn row_of(&mut self, point: DVec2) -> u32 {
+        let key = [point.x.to_bits(), point.y.to_bits()];
+        *self.rows.entry(key).or_insert_with(|| {
+            self.points.push(point);
+            self.points.len() as u32 - 1
+        })
+    }
+
+    fn finish(self) -> RecordBatch {
+        let column = |of: fn(&DVec2) -> f64| -> ArrayRef {
+            Arc::new(Float64Array::from_iter_values(self.points.iter().map(of)))
+        };
+        Points.batch(vec![column(|point| point.x), column(|point| point.y)])
+    }
+}
+
+fn numbers(values: impl Iterator<Item = u32>) -> ArrayRef {
+    Arc::new(UInt32Array::from_iter_values(values))
+}
+
+fn face_rows(
+    map: &VisibilityMap,
+    scene: &Scene,
+    faces: &[FaceId],
+    points: &mut PointRows,
+) -> RecordBatch {
+    let table = &map.faces;
+    let (mut outlines, mut corners) = (Lists::new(), Lists::new());
+    let mut materials = Vec::with_capacity(faces.len());
+    for &face in faces {
+        let mesh = scene.mesh_of(table.object(face));
+        let source = table.source(face);
+        outlines.push(
+            table
+                .outline(face)
+                .iter()
+                .map(|&point| points.row_of(point)),
+        );
+        corners.push(mesh.corners_of(source));
+        materials.push(mesh.material_of(source).0);
+    }
+    let plane = |of: fn(&Affine) -> f64| -> ArrayRef {
+        let planes = faces.iter().map(|&face| of(table.face_nearness(face)));
+        Arc::new(Float64Array::from_iter_values(planes))
+    };
+    let opaque: BooleanArray = faces
+        .iter()
+        .map(|&face| Some(!table.is_veil(face)))
+        .collect();
+    Faces.batch(vec![
+        numbers(faces.iter().map(|face| face.0)),
+        numbers(faces.iter().map(|&face| table.object(face).0)),
+        numbers(materials.into_iter()),
+        Arc::new(opaque),
+        numbers(faces.iter().map(|&face| table.plane(face).0)),
+        plane(|plane| plane.a),
+        plane(|plane| plane.b),
+        plane(|plane| plane.c),
+        outlines.finish(),
+        corners.finish(),
+    ])
+}
+
+fn fragment_rows(
+    table: TableName,
+    fragments: &Fragments,
+    indices: &[u32],
+    points: &mut PointRows,
+) -> RecordBatch {
+    let [mut outlines, mut side_faces, mut side_kinds] = [(); 3].map(|()| Lists::new());
+    for &index in indices {
+        let (vertices, sides) = match fragments.get(index as usize) {
+            Fragment::Whole(_) => (&[][..], &[][..]),
+            Fragment::Cut {
+                vertices, sides, ..
+            } => (vertices, sides),
+        };
+        outlines.push(vertices.iter().map(|&point| points.row_of(point)));
+        side_faces.push(sides.iter().map(|side| side.face.0));
+        side_kinds.push(sides.iter().map(|side| side.kind));
+    }
+    let faces = indices
+        .iter()
+        .map(|&index| fragments.face(index as usize).0);
+    table.batch(vec![
+        numbers(faces),
+        outlines.finish(),
+        side_faces.finish(),
+        side_kinds.finish(),
+    ])
+}
+
+fn vertex_rows(map: &VisibilityMap, scene: &Scene, faces: &[FaceId]) -> RecordBatch {
+    let mut rows: Vec<(ObjectId, u32)> = Vec::new();
+    for &face in faces {
+        let object = map.faces.object(face);
+        let corners = scene.mesh_of(object).corners_of(map.faces.source(face));
+        rows.extend(corners.map(|corner| (object, corner)));
+    }
+    rows.sort_unstable();
+    rows.dedup();
+    let meshes: Vec<(&Mesh, usize)> = rows
+        .iter()
+        .map(|&(object, vertex)| (scene.mesh_of(object), vertex as usize))
+        .collect();
+    let position = |of: fn(DVec3) -> f64| -> ArrayRef {
+        let rows = meshes.iter().map(|&(mesh, row)| of(mesh.positions[row]));
+        Arc::new(Float64Array::from_iter_values(rows))
+    };
+    let mut columns = vec![
+        numbers(rows.iter().map(|row| row.0.0)),
+        numbers(rows.iter().map(|row| row.1)),
+        position(|p| p.x),
+        position(|p| p.y),
+        position(|p| p.z),
+    ];
+    for attribute in 0..ATTRIBUTES.len() {
+        let column: Float32Array = meshes
+            .iter()
+            .map(|&(mesh, row)| attribute_of(mesh, row, attribute))
+            .collect();
+        columns.push(Arc::new(column));
+    }
+    Vertices.batch(columns)
+}
+
+/// Attribute `attribute` of [`ATTRIBUTES`] at a vertex.
+fn attribute_of(mesh: &Mesh, row: usize, attribute: usize) -> Option<f32> {
+    match attribute {
+        0..3 => mesh.normals.get(row).map(|n| n[attribute]),
+        3..5 => mesh.texcoords.get(row).map(|uv| uv[attribute - 3]),
+        5..7 => mesh.second_texcoords.get(row).map(|uv| uv[attribute - 5]),
+        7..10 => mesh.colors.get(row).map(|rgb| rgb[attribute - 7]),
+        _ => mesh.opacities.get(row).copied(),
+    }
+}
+
+/// A batch of objects.
+pub fn object_rows(objects: &[Object]) -> RecordBatch {
+    let names = StringArray::from_iter_values(objects.iter().map(|object| &object.name));
+    let field = Field::new_list_field(DataType::Float64, false);
+    let mut matrices = FixedSizeListBuilder::new(Float64Builder::new(), 16).with_field(field);
+    for object in objects {
+        let columns = object.world_from_object.to_cols_array();
+        matrices.values().append_slice(&columns);
+        matrices.append(true);
+    }
+    Objects.batch(vec![Arc::new(names), Arc::new(matrices.finish())])
+}
+
+/// The batch of an image.
+pub fn image_row(image: &Image) -> RecordBatch {
+    Images.batch(vec![
+        Arc::new(StringArray::from_iter_values([&image.name])),
+        numbers([image.width].into_iter()),
+        numbers([image.height].into_iter()),
+        Arc::new(LargeBinaryArray::from_iter_values([image
+            .pixels
+            .as_flattened()])),
+    ])
+}
+
+/// A batch that was read, and what to say of it if it is not as it should be.
+pub struct Rows<'a> {
+    pub batch: &'a RecordBatch,
+    pub member: &'static str,
+    pub index: usize,
+}
+
+impl Rows<'_> {
+    /// An error about these rows.
+    pub fn unsound(&self, what: impl std::fmt::Display) -> FileError {
+        FileError::unsound(self.member, format!("batch {}: {what}", self.index))
+    }
+
+    fn column<'a, A: Array + 'static>(
+        &'a self,
+        name: &str,
+        cast: impl Fn(&'a ArrayRef) -> Option<&'a A>,
+    ) -> Result<&'a A, FileError> {
+        let column = self.batch.column_by_name(name).and_then(cast);
+        column.ok_or_else(|| self.unsound(format_args!("no column `{name}` of the right type")))
+    }
+
+    /// A column without gaps.
+    fn full<'a, A: Array + 'static>(
+        &'a self,
+        name: &str,
+        cast: impl Fn(&'a ArrayRef) -> Option<&'a A>,
+    ) -> Result<&'a A, FileError> {
+        let column = self.column(name, cast)?;
+        if column.null_count() > 0 {
+            return Err(self.unsound(format_args!("a gap in the column `{name}`")));
+        }
+        Ok(column)
+    }
+
+    fn numbers(&self, name: &str) -> Result<&[u32], FileError> {
+        let column = self.full(name, |column| column.as_primitive_opt::<UInt32Type>())?;
+        Ok(column.values())
+    }
+
+    fn reals(&self, name: &str) -> Result<&[f64], FileError> {
+        let column = self.full(name, |column| column.as_primitive_opt::<Float64Type>())?;
+        if column.values().iter().any(|value| !value.is_finite()) {
+            return Err(self.unsound(format_args!("a number in `{name}` is not finite")));
+        }
+        Ok(column.values())
+    }
+
+    fn lists(&self, name: &str) -> Result<NumberLists<'_>, FileError> {
+        let lists: &ListArray = self.full(name, |column| column.as_list_opt::<i32>())?;
+        let numbers = lists.values().as_primitive_opt::<UInt32Type>();
+        let numbers = numbers.filter(|numbers| numbers.null_count() == 0);
+        let numbers = numbers
+            .ok_or_else(|| self.unsound(format_args!("no numbers in the lists `{name}`")))?;
+        Ok(NumberLists {
+            ends: lists.value_offsets(),
+            numbers: numbers.values(),
+        })
+    }
+
+    /// The points of a tile.
+    pub fn points(&self) -> Result<Vec<DVec2>, FileError> {
+        let (x, y) = (self.reals("x")?, self.reals("y")?);
+        Ok(x.iter().zip(y).map(|(&x, &y)| DVec2::new(x, y)).collect())
+    }
+
+    /// The faces of a tile; outlines are of `points`.
+    pub fn faces(&self, points: &[DVec2]) -> Result<Vec<FaceRow>, FileError> {
+        let (face, object) = (self.numbers("face")?, self.numbers("object")?);
+        let (material, plane) = (self.numbers("material")?, self.numbers("plane")?);
+        let opaque = self.full("opaque", |column| column.as_boolean_opt())?;
+        let (a, b, c) = (self.reals("a")?, self.reals("b")?, self.reals("c")?);
+        let (outlines, corners) = (self.lists("outline")?, self.lists("corners")?);
+        (0..face.len())
+            .map(|row| {
+                Ok(FaceRow {
+                    face: face[row],
+                    object: object[row],
+                    material: material[row],
+                    opaque: opaque.value(row),
+                    plane: plane[row],
+                    nearness: Affine::new(a[row], b[row], c[row]),
+                    outline: self.outline(outlines.of(row), points)?,
+                    corners: corners.of(row).to_vec(),
+                })
+            })
+            .collect()
+    }
+
+    fn outline(&self, rows: &[u32], points: &[DVec2]) -> Result<Vec<DVec2>, FileError> {
+        let point = |&row: &u32| points.get(row as usize).copied();
+        let outline: Option<Vec<DVec2>> = rows.iter().map(point).collect();
+        outline.ok_or_else(|| self.unsound("an outline names a point that is not there"))
+    }
+
+    /// The fragments of a tile; outlines are of `points`.
+    pub fn fragments(&self, points: &[DVec2]) -> Result<Vec<FragmentRow>, FileError> {
+        let face = self.numbers("face")?;
+        let outlines = self.lists("outline")?;
+        let (side_faces, side_kinds) = (self.lists("side_face")?, self.lists("side_kind")?);
+        (0..face.len())
+            .map(|row| {
+                let vertices = self.outline(outlines.of(row), points)?;
+                let (faces, kinds) = (side_faces.of(row), side_kinds.of(row));
+                let is_whole = vertices.is_empty() && faces.is_empty() && kinds.is_empty();
+                let fits = vertices.len() == faces.len() && faces.len() == kinds.len();
+                if !(is_whole || fits && vertices.len() >= 3) {
+                    return Err(
+                        self.unsound(format_args!("fragment {row} has no side for each vertex"))
+                    );
+                }
+                let sides = faces.iter().zip(kinds).map(|(&face, &kind)| Side {
+                    face: FaceId(face),
+                    kind,
+                });
+                Ok(FragmentRow {
+                    face: face[row],
+                    vertices,
+                    sides: sides.collect(),
+                })
+            })
+            .collect()
+    }
+
+    /// The vertices of a tile.
+    pub fn vertices(&self) -> Result<Vec<VertexRow>, FileError> {
+        let (object, vertex) = (self.numbers("object")?, self.numbers("vertex")?);
+        let (x, y, z) = (self.reals("x")?, self.reals("y")?, self.reals("z")?);
+        let columns: Result<Vec<&Float32Array>, FileError> = ATTRIBUTES
+            .iter()
+            .map(|name| self.column(name, |column| column.as_primitive_opt::<Float32Type>()))
+            .collect();
+        let columns = columns?;
+        Ok((0..object.len())
+            .map(|row| VertexRow {
+                object: object[row],
+                vertex: vertex[row],
+                position: DVec3::new(x[row], y[row], z[row]),
+                attributes: std::array::from_fn(|attribute| {
+                    let column = columns[attribute];
+                    column.is_valid(row).then(|| column.value(row).to_bits())
+                }),
+            })
+            .collect())
+    }
+
+    /// A batch of objects, without meshes.
+    pub fn objects(&self) -> Result<Vec<(String, DMat4)>, FileError> {
+        let names = self.full("name", |column| column.as_string_opt::<i32>())?;
+        let matrices = self.full("world_from_object", |column| {
+            column.as_fixed_size_list_opt()
+        })?;
+        let values = matrices.values().as_primitive_opt::<Float64Type>();
+        let values = values.filter(|values| {
+            matrices.value_length() == 16
+                && values.null_count() == 0
+                && values.len() == 16 * names.len()
+        });
+        let values = values.ok_or_else(|| self.unsound("the matrices are not 16 numbers each"))?;
+        let (matrices, _) = values.values().as_chunks::<16>();
+        Ok(names
+            .iter()
+            .flatten()
+            .map(str::to_owned)
+            .zip(matrices.iter().map(DMat4::from_cols_array))
+            .collect())
+    }
+
+    /// An image.
+    pub fn image(&self) -> Result<Image, FileError> {
+        let (width, height) = (self.numbers("width")?, self.numbers("height")?);
+        let name = self.full("name", |column| column.as_string_opt::<i32>())?;
+        let bytes = self.full("rgba", |column| column.as_binary_opt::<i64>())?;
+        let ([width], [height]) = (width, height) else {
+            return Err(self.unsound("not one image"));
+        };
+        let (pixels, rest) = bytes.value(0).as_chunks::<4>();
+        let expected = u64::from(*width) * u64::from(*height);
+        if expected == 0 || pixels.len() as u64 != expected || !rest.is_empty() {
+            return Err(self.unsound(format_args!("the image is not {width} x {height} pixels")));
+        }
+        Ok(Image {
+            name: name.value(0).to_owned(),
+            width: *width,
+            height: *height,
+            pixels: pixels.to_vec(),
+        })
+    }
+}
+
+/// A column of lists.
+struct NumberLists<'a> {
+    ends: &'a [i32],
+    numbers: &'a [u32],
+}
+
+impl<'a> NumberLists<'a> {
+    fn of(&self, row: usize) -> &'a [u32] {
+        &self.numbers[self.ends[row] as usize..self.ends[row + 1] as usize]
+    }
+}
+
+/// A row of `faces.arrow`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceRow {
+    pub face: u32,
+    pub object: u32,
+    pub material: u32,
+    pub opaque: bool,
+    pub plane: u32,
+    pub nearness: Affine,
+    pub outline: Vec<DVec2>,
+    pub corners: Vec<u32>,
+}
+
+/// A row of `opaque.arrow` or `veils.arrow`; without vertices the face is seen whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FragmentRow {
+    pub face: u32,
+    pub vertices: Vec<DVec2>,
+    pub sides: Vec<Side>,
+}
+
+/// A row of `vertices.arrow`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VertexRow {
+    pub object: u32,
+    pub vertex: u32,
+    pub position: DVec3,
+    /// As bits, so that equal rows are equal whatever they hold.
+    attributes: [Option<u32>; ATTRIBUTES.len()],
+}
+
+impl VertexRow {
+    /// Adds the vertex to a mesh; `false` if it has other attributes than those before it.
+    pub fn push_to(&self, mesh: &mut Mesh) -> bool {
+        let attributes = self.attributes.map(|bits| bits.map(f32::from_bits));
+        let [nx, ny, nz, u, v, u2, v2, r, g, b, opacity] = attributes;
+        mesh.positions.push(self.position);
+        mesh.normals.extend(all([nx, ny, nz]).map(Vec3::from));
+        mesh.texcoords.extend(all([u, v]).map(Vec2::from));
+        mesh.second_texcoords.extend(all([u2, v2]).map(Vec2::from));
+        mesh.colors.extend(all([r, g, b]));
+        mesh.opacities.extend(opacity);
+        let count = mesh.positions.len();
+        let lengths = [
+            mesh.normals.len(),
+            mesh.texcoords.len(),
+            mesh.second_texcoords.len(),
+            mesh.colors.len(),
+            mesh.opacities.len(),
+        ];
+        lengths.iter().all(|&length| length == 0 || length == count)
+    }
+}
+
+fn all<const N: usize>(values: [Option<f32>; N]) -> Option<[f32; N]> {
+    let present = values.iter().all(Option::is_some);
+    present.then(|| values.map(Option::unwrap_or_default))
+}
+
+impl From<ArrowError> for FileError {
+    fn from(error: ArrowError) -> Self {
+        match error {
+            ArrowError::IoError(_, source) => Self::Io {
+                what: "a table",
+                source,
+            },
+            other => Self::unsound("a table", other.to_string()),
+        }
+    }
+}

@@ -1,0 +1,264 @@
+use super::*;
+use crate::VisibilityMap;
+use crate::scene::{
+    AlphaMode, Image, ImageId, Layer, Light, LightKind, Material, Mesh, MeshId, Object, Scene,
+    TextureRef, World,
+};
+use crate::{Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, Projection, SeenScene, Side};
+use std::io::Cursor;
+use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
+
+fn camera() -> Camera {
+    let projection = Projection::Perspective {
+        tan_half_height: 0.1 + 0.2,
+        aspect: 1.5,
+    };
+    let eye = DVec3::new(1.0 / 3.0, -4.0, 2.0);
+    Camera::looking(eye, DVec3::ZERO, DVec3::Z, projection, 0.1).expect("a sound camera")
+}
+
+/// A strip of quadrilaterals and triangles with all attributes.
+fn mesh(faces: u32) -> Mesh {
+    let mut mesh = Mesh {
+        materials: vec![(0, MaterialId(1)), (faces / 2, MaterialId(0))],
+        ..Mesh::default()
+    };
+    for k in 0..2 * faces + 2 {
+        let x = f64::from(k / 2) / 7.0;
+        mesh.positions
+            .push(DVec3::new(x, f64::from(k % 2), 0.1 * x));
+        mesh.normals.push(Vec3::new(0.0, 0.6, 0.8));
+        mesh.texcoords.push(Vec2::new(k as f32 / 3.0, 0.5));
+        mesh.colors.push([1.0, 0.5, k as f32]);
+    }
+    for face in 0..faces {
+        let [p, q, r, s] = [0, 1, 3, 2].map(|corner| 2 * face + corner);
+        if face % 3 == 0 {
+            mesh.push_fan(&[p, q, r, s]);
+        } else {
+            mesh.push_fan(&[p, q, r]);
+        }
+    }
+    mesh
+}
+
+/// A scene of two objects, with everything that a file keeps, and a map of it. It is not what the
+/// camera sees: files do not ask.
+fn seen(faces: u32) -> SeenScene {
+    let image = |name: &str| Image {
+        name: name.into(),
+        width: 2,
+        height: 1,
+        pixels: vec![[1, 2, 3, 4], [255, 0, 128, 9]],
+    };
+    let material = |name: &str, image: u32| Material {
+        name: name.into(),
+        base_color_texture: Some(TextureRef::new(ImageId(image))),
+        alpha_mode: AlphaMode::Mask(0.3),
+        ..Material::default()
+    };
+    let object = |name: &str, mesh: u32| Object {
+        name: name.into(),
+        mesh: MeshId(mesh),
+        world_from_object: DMat4::from_rotation_z(0.1 + f64::from(mesh)),
+    };
+    let triangles = Mesh {
+        materials: vec![(0, MaterialId(2))],
+        positions: mesh(faces).positions,
+        triangles: mesh(faces).triangles,
+        ..Mesh::default()
+    };
+    let light = Light {
+        name: "lämp".into(),
+        color: [1.0, 0.7, 0.1],
+        kind: LightKind::Point {
+            intensity: 0.1,
+            range: f32::INFINITY,
+        },
+        world_from_light: DMat4::IDENTITY,
+    };
+    let scene = Scene {
+        objects: vec![object("a/first", 0), object("b", 1)],
+        meshes: vec![mesh(faces), triangles],
+        materials: vec![
+            material("unused", 0),
+            material("wood", 1),
+            Material::default(),
+        ],
+        images: vec![image("unused.png"), image("wood.png")],
+        cameras: vec![("other".into(), camera())],
+        lights: vec![light],
+        layers: vec![Layer {
+            name: "a".into(),
+            priority: 2,
+            objects: 0..1,
+        }],
+        world: World {
+            crs: Some("EPSG:7415".into()),
+            origin: DVec3::new(84_900.1, 447_700.0, 0.0),
+            vertical_datum: None,
+        },
+    };
+    let mut table = Faces::new();
+    let (mut opaque, mut veils) = (Fragments::new(), Fragments::new());
+    for object in 0..2 {
+        for source in 0..faces / 2 {
+            let plane = table.push_plane(Affine::new(0.1, f64::from(source), 1.0));
+            let at = DVec2::new(
+                f64::from(source) / f64::from(faces),
+                f64::from(object) / 3.0,
+            );
+            let size = 1.0 / f64::from(faces);
+            let outline = [[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]].map(|p| at + size * DVec2::from(p));
+            let face = table.push(&outline, plane, ObjectId(object), source);
+            let face = face.expect("a triangle with area");
+            let cutter = FaceId(face.0.saturating_sub(1));
+            let sides = [
+                Side::of_outline(face, 0),
+                Side::crossing(cutter),
+                Side::scan(face),
+            ];
+            match source % 5 {
+                0 => opaque.push_whole(face),
+                1 => {
+                    opaque.push_cut(face, outline.into_iter().zip(sides));
+                    opaque.push_cut(face, outline.into_iter().zip(sides));
+                }
+                2 => {
+                    table.set_veil(face);
+                    veils.push_cut(face, outline.into_iter().zip(sides));
+                }
+                3 => {
+                    table.set_veil(face);
+                    veils.push_whole(face);
+                }
+                _ => {}
+            }
+        }
+    }
+    let map = VisibilityMap {
+        camera: camera(),
+        faces: table,
+        opaque,
+        veils,
+    };
+    SeenScene::of(&scene, &map, [1920, 1080])
+}
+
+fn written(seen: &SeenScene) -> Vec<u8> {
+    let source = Source {
+        path: "town.glb".into(),
+        length: 3,
+        xxh3: "0".into(),
+    };
+    let out = write_map(Cursor::new(Vec::new()), seen, &[source]).expect("memory takes all");
+    out.into_inner()
+}
+
+fn read(bytes: &[u8]) -> Result<SeenScene, FileError> {
+    MapReader::new(Cursor::new(bytes))?.check()
+}
+
+#[test]
+fn what_is_unseen_is_left_out_and_the_rest_stays() {
+    let seen = seen(20);
+    assert_eq!(SeenScene::of(&seen.scene, &seen.map, seen.size), seen);
+    let names: Vec<_> = seen
+        .scene
+        .materials
+        .iter()
+        .map(|m| m.name.as_str())
+        .collect();
+    assert_eq!(names, ["wood", ""]);
+    assert_eq!(seen.scene.images.len(), 1);
+    assert_eq!(seen.scene.images[0].name, "wood.png");
+    for (object, mesh) in seen.scene.meshes.iter().enumerate() {
+        mesh.check().expect("sound");
+        // Of every five faces one is neither seen nor named.
+        assert_eq!(mesh.face_count(), 8, "of object {object}");
+    }
+}
+
+#[test]
+fn what_was_written_is_read_bit_for_bit() {
+    // Of one tile, of several, and of none.
+    for faces in [12, 6000, 0] {
+        let seen = seen(faces);
+        let bytes = written(&seen);
+        assert!(bytes == written(&seen), "equal maps make equal bytes");
+        let found = read(&bytes).expect("sound");
+        assert!(found == seen, "{faces} faces");
+        let found = MapReader::new(Cursor::new(&bytes)).expect("sound");
+        assert_eq!(found.sources()[0].path, "town.glb");
+    }
+}
+
+#[test]
+fn a_window_reads_what_is_seen_in_it_and_little_more() {
+    let seen = seen(40_000);
+    let bytes = written(&seen);
+    let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+    let window = [DVec2::new(0.1, 0.2), DVec2::new(0.2, 0.9)];
+    let found = reader.read_window(window).expect("sound");
+    let share = reader.bytes_read() as f64 / bytes.len() as f64;
+    assert!(
+        share < 0.4,
+        "a fifth of the faces, but {share} of the bytes"
+    );
+    let shown = |seen: &SeenScene| {
+        let polygons = seen
+            .map
+            .opaque
+            .iter()
+            .map(|fragment| seen.map.polygon(fragment).to_vec());
+        let inside = polygons.filter(|polygon| {
+            polygon
+                .iter()
+                .any(|p| p.cmpge(window[0]).all() && p.cmple(window[1]).all())
+        });
+        inside.collect::<Vec<_>>()
+    };
+    assert!(shown(&found).len() > 1000);
+    assert_eq!(shown(&found), shown(&seen));
+    assert!(found.map.opaque.len() < seen.map.opaque.len() / 2);
+}
+
+#[test]
+fn every_cut_and_every_flipped_bit_of_a_small_file_is_an_error() {
+    let sound = written(&seen(6));
+    for length in 0..sound.len() {
+        assert!(read(&sound[..length]).is_err(), "cut to {length} bytes");
+    }
+    for bit in 0..8 * sound.len() {
+        let mut damaged = sound.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        let error = read(&damaged).err();
+        assert!(error.is_some(), "bit {bit} of {} bytes", sound.len());
+    }
+}
+
+#[test]
+fn flipped_bits_of_a_large_file_are_errors() {
+    let sound = written(&seen(6000));
+    let flips: u64 = std::env::var("VEDUTA_DAMAGE").map_or(500, |n| n.parse().expect("a number"));
+    let mut state = 1_u64;
+    for _ in 0..flips {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let bit = (state >> 20) as usize % (8 * sound.len());
+        let mut damaged = sound.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        assert!(read(&damaged).is_err(), "bit {bit}");
+    }
+}
+
+#[test]
+fn another_version_is_refused_by_its_number() {
+    let text = format!(
+        r#"{{"format":"{}","version":[2,7],"more":1}}"#,
+        manifest::FORMAT
+    );
+    let error = manifest::Manifest::parse(text.as_bytes()).expect_err("of another version");
+    assert!(error.to_string().contains("version 2.7"), "{error}");
+}

@@ -1,0 +1,20 @@
+//! Depth compositing: several visibility maps of one camera become one.
+//!
+//! Nakamae et al. (1989), "Compositing 3D images", merge the spans of a scanline by depth, in three
+//! cases: no crossing, a crossing, an overlap. Here the spans are exact fragments with the planes of
+//! their faces, and the cases are the signs of the difference of two planes, so that pictures merge
+//! exactly, also where surfaces pass through one another. All maps are merged in one pass.
+//!
+//! - [`merge`]: what is seen of several sets of faces -> what is seen of all of them. A fragment is
+//!   clipped by the fragments of the *other* maps only, and only by what was seen of them: what is
+//!   hidden in its own map stays hidden.
+//! - [`composite`]: the same for stored maps with what is seen of their scenes, which are united.
+//!
+//! Coplanar faces of different maps are decided by the order of their faces: priority of the layer,
+//! name of the object, face; whatever the order of the maps.
+
+mod merge;
+mod unite;
+
+pub use merge::merge;
+pub use unite::{CompositeError, composite};
