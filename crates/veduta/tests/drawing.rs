@@ -440,7 +440,7 @@ fn no_background_is_seen_between_neighbours() {
         }
         // Without traps it is: this is what is being tested.
         assert!(
-            largest_leak(&drawing, 1.0, |shape| &shape.seen) > 0.1,
+            largest_leak(&drawing, 1.0, |shape| &shape.seen).share > 0.1,
             "{name}"
         );
     }
