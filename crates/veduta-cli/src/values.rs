@@ -205,6 +205,19 @@ pub fn line_width(text: &str) -> Result<f64, String> {
     }
 }
 
+/// How far shapes reach under others, in pixels.
+pub fn trap(text: &str) -> Result<f64, String> {
+    match text
+        .strip_suffix("px")
+        .unwrap_or(text)
+        .trim()
+        .parse::<f64>()
+    {
+        Ok(trap) if (0.0..=100.0).contains(&trap) => Ok(trap),
+        _ => Err("expected a number of pixels from 0 to 100, such as 4".into()),
+    }
+}
+
 /// An angle in radians from 0 to 180 degrees: `30deg`, `30` or `0.5rad`.
 pub fn crease_angle(text: &str) -> Result<f64, String> {
     match radians(text) {
@@ -311,6 +324,14 @@ mod tests {
         assert_eq!(line_width("25.4mm"), Ok(96.0));
         for text in ["0", "-1px", "nan", "1e9mm", "px", "1cm"] {
             assert!(line_width(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn traps_have_some_width_or_none() {
+        assert_eq!((trap("0"), trap("2.5px")), (Ok(0.0), Ok(2.5)));
+        for text in ["-1", "101", "nan", "2mm", ""] {
+            assert!(trap(text).is_err(), "{text}");
         }
     }
 

@@ -249,8 +249,8 @@ fn a_wall_behind_a_window_is_one_shape_with_a_hole() {
     // 100 pixels a metre.
     assert!((area(&wall.seen) - (4.0 - 0.5) * 1e4).abs() < 1e-6);
     assert!((area(&window.seen) - 0.5 * 1e4).abs() < 1e-6);
-    // The wall goes on under the window for two pixels, and nowhere else.
-    let beneath = 0.5 * 1e4 - (100.0 - 4.0) * (50.0 - 4.0);
+    // The wall goes on under the window for four pixels, and nowhere else.
+    let beneath = 0.5 * 1e4 - (100.0 - 8.0) * (50.0 - 8.0);
     assert!((area(&wall.painted) - area(&wall.seen) - beneath).abs() < 1e-3);
     assert_eq!(window.painted, window.seen);
     assert!((wall.nearest - 1.0).abs() < 1e-9 && (window.farthest - 0.5).abs() < 1e-9);

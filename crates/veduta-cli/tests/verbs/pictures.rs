@@ -218,6 +218,7 @@ fn options_of_pixels_and_of_vector_pictures_are_not_mixed() {
             "-o a.geojson --lines crease",
             "--lines is for .svg and .pdf",
         ),
+        ("-o a.geojson --trap 1", "--trap is for .svg and .pdf"),
         ("-o a.svg --sampling multiscan:3", "leave --sampling out"),
         ("-o a.svg --background sky.png", "background of one colour"),
     ] {

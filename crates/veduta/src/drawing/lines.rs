@@ -6,7 +6,7 @@
 
 use super::join::depth_unit;
 use super::subdivision::{HalfEdge, Subdivision};
-use super::{COINCIDENT, LineKind, Settings, Stroke, trace};
+use super::{COINCIDENT, LineKind, Settings, Stroke, is_on_frame, trace};
 use crate::dice::PixelGrid;
 use crate::scene::{Mesh, MeshId, Scene};
 use std::collections::HashMap;
@@ -132,12 +132,9 @@ impl<'a> Judge<'a> {
     /// frame.
     fn meeting(&self, index: u32, edge: &HalfEdge) -> Option<(FaceId, Meeting)> {
         let face = self.map.opaque.face(edge.polygon as usize);
-        let [from, to] = self.subdivision.ends(index);
+        let ends @ [from, to] = self.subdivision.ends(index);
         let Some(across) = self.subdivision.across(index) else {
-            let is_on_frame =
-                |axis: usize| from[axis] == to[axis] && (from[axis] == 0.0 || from[axis] == 1.0);
-            let is_cut = is_on_frame(0) || is_on_frame(1);
-            return (!is_cut).then_some((face, Meeting::Step));
+            return (!is_on_frame(ends)).then_some((face, Meeting::Step));
         };
         let other = self.map.opaque.face(across as usize);
         if other == face {

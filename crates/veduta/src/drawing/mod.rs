@@ -62,6 +62,9 @@ pub enum Evenness {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// How far, in pixels, shapes reach under those painted later; 0 for not at all.
+    ///
+    /// Twice the diagonal of a viewer's pixel is enough: half of what is between a shape and
+    /// another that was painted earlier is left to that one. At full size that is 2.8 pixels.
     pub trap: f64,
     /// Whether shapes are made.
     pub shapes: bool,
@@ -72,10 +75,10 @@ pub struct Settings {
 }
 
 impl Default for Settings {
-    /// Shapes that reach 2 pixels under others, no lines; creases from 30 degrees.
+    /// Shapes that reach 4 pixels under others, no lines; creases from 30 degrees.
     fn default() -> Self {
         Self {
-            trap: 2.0,
+            trap: 4.0,
             shapes: true,
             lines: Vec::new(),
             crease_angle: 30f64.to_radians(),
@@ -330,6 +333,16 @@ fn shape(
         nearest,
         farthest,
     }
+}
+
+/// Whether a side of a fragment lies on the border of the picture.
+fn is_on_frame(ends: [DVec2; 2]) -> bool {
+    // Points of the border may have become one with others beside it.
+    let near = |axis: usize, border: f64| {
+        ends.iter()
+            .all(|end| (end[axis] - border).abs() <= 2.0 * COINCIDENT)
+    };
+    (0..2).any(|axis| near(axis, 0.0) || near(axis, 1.0))
 }
 
 /// Depth in metres of what has that nearness.

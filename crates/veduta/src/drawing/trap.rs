@@ -26,7 +26,7 @@
 //! out. What is nearer to it than to the own side is given up, by one cut along the bisector of the two.
 
 use super::subdivision::Subdivision;
-use super::trace;
+use super::{is_on_frame, trace};
 use crate::dice::PixelGrid;
 use veduta_geometry::{Affine, DVec2, cross, signed_area};
 
@@ -238,7 +238,7 @@ impl<'a> Trapper<'a> {
                 }
                 let is_exit = match self.subdivision.across(edge) {
                     // Beyond the frame there is no picture for a trap to be seen in.
-                    None => !self.is_on_frame(edge),
+                    None => !is_on_frame(self.subdivision.ends(edge)),
                     Some(across) if self.rank[across as usize] > own_rank => {
                         if !reached.contains(&across) {
                             reached.push(across);
@@ -259,11 +259,6 @@ impl<'a> Trapper<'a> {
                 traps.push(part);
             }
         }
-    }
-
-    fn is_on_frame(&self, edge: u32) -> bool {
-        let [p, q] = self.subdivision.ends(edge);
-        p.x == q.x && (p.x == 0.0 || p.x == 1.0) || p.y == q.y && (p.y == 0.0 || p.y == 1.0)
     }
 }
 
