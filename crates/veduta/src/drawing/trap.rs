@@ -13,7 +13,7 @@
 //!   ____a__________b____                ended at right angles, or halfway to the next side's zone;
 //!       :  f1 | f2 :      later       traps: what f1, f2, f3 … cover of the zone, as far as one gets
 //!       :_____|____:      shapes        from a-b through fragments of later shapes;
-//!       \ _ . - ' exit                less what is nearer to an exit than to a-b.
+//!       \ _ . - ' exit                less what is too near to an exit.
 //! ```
 //!
 //! Shapes thinner than [`super::UNSEEN`] are not painted, and all others reach under them as if they
@@ -23,7 +23,8 @@
 //! Beyond a sharp point of the shape, where zones at either side would leave a wedge open, lies one more.
 //!
 //! An exit is a side beyond which there is nothing, or a shape painted earlier: where the trap would peep
-//! out. What is nearer to it than to the own side is given up, by one cut along the bisector of the two.
+//! out. What is near to it is given up: nearer than half a pixel, and than a quarter of the distance from
+//! the own side.
 
 use super::subdivision::Subdivision;
 use super::{is_on_frame, trace};
@@ -230,6 +231,10 @@ impl<'a> Trapper<'a> {
             for half_plane in &zone.0 {
                 part = clipped(&part, half_plane);
             }
+            // Far enough from all exits by share, and in pixels: together a little less than far enough
+            // from each by either, but convex.
+            let mut parts = [part.clone(), part];
+            let mut has_exit = false;
             // However thin the part is, what lies beyond it may be reached through it.
             for edge in edges {
                 let ends = self.pixels(edge);
@@ -247,17 +252,21 @@ impl<'a> Trapper<'a> {
                     }
                     Some(across) => self.rank[across as usize] < own_rank,
                 };
-                // Along the side itself there is no nearer half.
+                // Along the side itself no distance can be kept.
                 let is_along = ends
                     .iter()
                     .all(|&end| zone.0[0].at(end).abs() <= COINCIDENT);
                 if is_exit && !is_along {
-                    part = clipped(&part, &nearer_to_side(side, ends));
+                    has_exit = true;
+                    for (part, far) in parts.iter_mut().zip(far_from_exit(side, ends)) {
+                        *part = clipped(part, &far);
+                    }
                 }
             }
-            if signed_area(&part) > NEGLIGIBLE_AREA {
-                traps.push(part);
-            }
+            // Without exits both are the same.
+            let count = if has_exit { 2 } else { 1 };
+            let parts = parts.into_iter().take(count);
+            traps.extend(parts.filter(|part| signed_area(part) > NEGLIGIBLE_AREA));
         }
     }
 }
@@ -268,11 +277,26 @@ fn distance_from(point: DVec2, along: DVec2) -> Affine {
     Affine::new(-along.y, along.x, -cross(along, point))
 }
 
-/// How much nearer a point is to the side than to the line of an exit.
-fn nearer_to_side(side: &Side, [from, to]: [DVec2; 2]) -> Affine {
-    let from_side = distance_from(side.from, side.along).negated();
+/// How near to an exit traps may come: as a share of the distance from the side, and in pixels; the less
+/// of the two. With more, traps would be missing in pixels that the exit does not touch; with less, thin
+/// shapes would look fat.
+const NEAR_EXIT: (f64, f64) = (0.25, 0.5);
+
+/// Where a trap of the side keeps its distance from an exit, as a share and in pixels: where the functions
+/// are at least zero.
+fn far_from_exit(side: &Side, [from, to]: [DVec2; 2]) -> [Affine; 2] {
+    let from_side = distance_from(side.from, side.along);
     let from_exit = distance_from(from, (to - from).normalize_or_zero());
-    from_exit.minus(&from_side)
+    let (share, pixels) = NEAR_EXIT;
+    [
+        // The distance from the side is negative where its trap lies.
+        Affine::new(
+            from_exit.a + share * from_side.a,
+            from_exit.b + share * from_side.b,
+            from_exit.c + share * from_side.c,
+        ),
+        Affine::new(from_exit.a, from_exit.b, from_exit.c - pixels),
+    ]
 }
 
 /// How sharply two sides may turn (the cosine) for their zones to meet halfway. Where they turn by more
