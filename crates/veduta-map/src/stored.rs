@@ -59,7 +59,39 @@ fn faces_named(map: &VisibilityMap) -> Vec<FaceId> {
     named.collect()
 }
 
+impl SeenScene {
+    /// What is seen of the objects that `wanted` accepts by their names. Where others were seen nothing
+    /// is: what they hide is not known.
+    pub fn selected(&self, wanted: impl Fn(&str) -> bool) -> Self {
+        let is_wanted: Vec<bool> = self.scene.objects.iter().map(|o| wanted(&o.name)).collect();
+        let faces = &self.map.faces;
+        let keep = |face: FaceId| is_wanted[faces.object(face).index()];
+        let map = VisibilityMap {
+            opaque: self.map.opaque.selected(keep),
+            veils: self.map.veils.selected(keep),
+            ..self.map.clone()
+        };
+        Self::of(&self.scene, &map, self.size)
+    }
+}
+
 impl Fragments {
+    /// The fragments of the faces that `wanted` accepts.
+    pub fn selected(&self, wanted: impl Fn(FaceId) -> bool) -> Self {
+        let mut selected = Self::new();
+        for fragment in self.iter().filter(|fragment| wanted(fragment.face())) {
+            match fragment {
+                Fragment::Whole(face) => selected.push_whole(face),
+                Fragment::Cut {
+                    face,
+                    vertices,
+                    sides,
+                } => selected.push_cut(face, vertices.iter().copied().zip(sides.iter().copied())),
+            }
+        }
+        selected
+    }
+
     /// The same fragments of faces with other numbers, in their order.
     pub fn renumbered(&self, new_id: impl Fn(FaceId) -> FaceId) -> Self {
         let mut order: Vec<usize> = (0..self.len()).collect();

@@ -3,12 +3,13 @@
 use super::look::Look;
 use super::output::Output;
 use super::stored::{Changes, open, refuse_place, summary, tell_work};
-use super::tell_shortcomings;
+use super::{tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
+use crate::values::Names;
 use clap::Args;
 use std::path::PathBuf;
-use veduta::composite::{CompositeError, composite};
+use veduta::composite::{CompositeError, hold_out};
 use veduta::map::SeenScene;
 use veduta::map::file::Source;
 use veduta::pipeline::{self, RenderSettings};
@@ -25,6 +26,18 @@ pub struct Composite {
     /// The maps: .veduta
     #[arg(required = true, value_name = "MAP")]
     maps: Vec<PathBuf>,
+    /// A map that only hides: where it is seen nothing is, and the picture has a hole of its exact
+    /// shape. May be given several times
+    #[arg(long, value_name = "MAP")]
+    holdout: Vec<PathBuf>,
+    /// Take only the objects of these names from the maps; names match with *, ** and ?. May be given
+    /// several times
+    #[arg(long, value_name = "NAME")]
+    only: Vec<Names>,
+    /// Leave out the objects of these names: where they were seen, nothing of their map is. May be given
+    /// several times
+    #[arg(long, value_name = "NAME")]
+    without: Vec<Names>,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -44,6 +57,8 @@ Examples:
       veduta render pavilion.obj --eye 40,-60,25 --look-at 0,0,4 -o pavilion.veduta
       veduta composite town.veduta pavilion.veduta -o both.veduta
       veduta composite town.veduta pavilion.veduta -o both.png
+  The pavilion alone, with holes where the town stands before it:
+      veduta composite pavilion.veduta --holdout town.veduta -o element.exr
 ";
 
 impl Composite {
@@ -63,8 +78,8 @@ impl Composite {
         let mut maps: Vec<SeenScene> = Vec::new();
         let mut sources: Vec<Source> = Vec::new();
         talk.begin("reading");
-        for (index, path) in self.maps.iter().enumerate() {
-            talk.part(index, self.maps.len());
+        for (index, path) in self.maps.iter().chain(&self.holdout).enumerate() {
+            talk.part(index, self.maps.len() + self.holdout.len());
             let mut map = open(path)?;
             for source in map.reader().sources() {
                 if !sources.contains(source) {
@@ -73,8 +88,10 @@ impl Composite {
             }
             maps.push(map.read(|reader| reader.read())?);
         }
+        self.select(&mut maps)?;
         talk.begin("compositing");
-        let mut seen = composite(&maps).map_err(|error| self.refusal(&error))?;
+        let (shown, holdouts) = maps.split_at(self.maps.len());
+        let mut seen = hold_out(shown, holdouts).map_err(|error| self.refusal(&error))?;
         self.changes.apply(&mut seen.scene, self.strict, talk)?;
         let mut told = serde_json::json!({
             "size": seen.size,
@@ -115,13 +132,41 @@ impl Composite {
         Ok(())
     }
 
+    /// Leaves the objects asked for in the maps; a name that no object has is an error.
+    fn select(&self, maps: &mut [SeenScene]) -> Result<(), Failure> {
+        let objects = || maps.iter().flat_map(|seen| &seen.scene.objects);
+        for names in self.only.iter().chain(&self.without) {
+            if !objects().any(|object| names.match_name(&object.name)) {
+                let known = objects().map(|object| object.name.as_str());
+                let help = unknown_name(names.text(), "objects", known.collect::<Vec<_>>());
+                let message = format!("no object of the maps is called {:?}; {help}", names.text());
+                return Err(Failure::new(Code::Missing, message));
+            }
+        }
+        if self.only.is_empty() && self.without.is_empty() {
+            return Ok(());
+        }
+        let is_of = |list: &[Names], name: &str| list.iter().any(|names| names.match_name(name));
+        for seen in maps.iter_mut().take(self.maps.len()) {
+            *seen = seen.selected(|name| {
+                (self.only.is_empty() || is_of(&self.only, name)) && !is_of(&self.without, name)
+            });
+        }
+        Ok(())
+    }
+
     /// What is wrong, with the names of the files.
     fn refusal(&self, error: &CompositeError) -> Failure {
         let message = match error {
             CompositeError::OtherCamera { index, difference }
             | CompositeError::OtherWorld { index, difference } => format!(
                 "{}: cannot be composited with {}: {difference}",
-                self.maps[*index].display(),
+                self.maps
+                    .iter()
+                    .chain(&self.holdout)
+                    .nth(*index)
+                    .unwrap_or(&self.maps[0])
+                    .display(),
                 self.maps[0].display()
             ),
             other => other.to_string(),

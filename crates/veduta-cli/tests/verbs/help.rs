@@ -5,6 +5,8 @@ use std::process::Command;
 
 const VERBS: &[&str] = &[
     "render",
+    "shade",
+    "composite",
     "info",
     "check",
     "diff",

@@ -9,6 +9,7 @@ mod info;
 mod pictures;
 mod pipes;
 mod preview;
+mod stored;
 
 use assert_cmd::Command;
 use std::fs;

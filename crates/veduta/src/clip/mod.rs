@@ -18,6 +18,7 @@ pub(crate) use cells::{CellLists, OPEN, listed, listed_between};
 pub(crate) use clipper::{Clipper, Context};
 pub(crate) use found::{Entry, Found, Pile};
 pub(crate) use grid::{CellSet, Extent, Grid};
+pub(crate) use pieces::Corner;
 
 use crate::buckets::Buckets;
 use rayon::prelude::*;

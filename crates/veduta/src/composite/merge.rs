@@ -1,25 +1,35 @@
-use crate::clip::{CellLists, Context, Extent, Found, Grid, by_place, clip_each, listed};
-use veduta_geometry::DVec2;
-use veduta_map::{FaceId, Faces, Fragment, Fragments, ObjectId, Seen, Side};
+use crate::clip::{CellLists, Context, Corner, Extent, Found, Grid, by_place, clip_each, listed};
+use std::ops::Range;
+use veduta_map::{FaceId, Faces, Fragment, Fragments, Seen};
 
 /// Where each face is seen once all `maps` are seen together.
 ///
 /// Each map is what is seen of some faces of the common table `faces`, each of which belongs to one
 /// map; of faces that share a plane the smaller id is seen. `aspect` is width over height of the frame.
 ///
-/// Clipping by what is seen is enough: a fragment that is hidden in its map is hidden by something
-/// nearer there.
+/// What is left of a face in its map is clipped by the faces *seen* in the others, and by all of each:
+/// where such a face is hidden in its own map, something nearer hides this one too. So the lines that
+/// cut are the very lines that would have cut if all had been found together, which corners of
+/// fragments, rounded as they are, would miss.
 pub fn merge(faces: &Faces, maps: &[Seen], aspect: f64) -> Seen {
-    let pieces = SeenPieces::of(faces, maps);
-    let extents = Extent::of_all(&pieces.outlines);
-    let grid = Grid::choose(pieces.outlines.len(), aspect, [0.0, 1.0], None);
+    let rows: Vec<Row> = rows(faces, maps);
+    let mut row_of = vec![NOT_SEEN; faces.len()];
+    for (row, index) in rows.iter().zip(0..) {
+        row_of[row.face.index()] = index;
+    }
+    let extents = Extent::of_all(faces);
+    let grid = Grid::choose(rows.len(), aspect, [0.0, 1.0], None);
     let context = Context {
-        faces: &pieces.outlines,
+        faces,
         extents: &extents,
         grid: &grid,
     };
-    let lists: Vec<CellLists> = (0..maps.len() as u32)
-        .map(|map| listed(&context, |piece| pieces.map[piece.index()] == map))
+    let is_of = |face: FaceId, map: usize| {
+        let row = row_of[face.index()];
+        row != NOT_SEEN && rows[row as usize].map == map
+    };
+    let lists: Vec<CellLists> = (0..maps.len())
+        .map(|map| listed(&context, |face| is_of(face, map)))
         .collect();
     // Of each map, the others' lists.
     let others: Vec<Vec<&CellLists>> = (0..lists.len())
@@ -28,119 +38,71 @@ pub fn merge(faces: &Faces, maps: &[Seen], aspect: f64) -> Seen {
             others.map(|(_, list)| list).collect()
         })
         .collect();
-    let all: Vec<FaceId> = pieces.outlines.ids().collect();
-    let in_order = by_place(&context, &all);
-    let piles = clip_each(&context, &in_order, |clipper, (): &mut (), piece, pile| {
-        clipper.clip(piece, &others[pieces.map[piece.index()] as usize]);
-        clipper.store(piece, pile);
-    });
+    let seen: Vec<FaceId> = rows.iter().map(|row| row.face).collect();
+    let in_order = by_place(&context, &seen);
+    let piles = clip_each(
+        &context,
+        &in_order,
+        |clipper, corners: &mut Vec<Vec<Corner>>, face, pile| {
+            let row = &rows[row_of[face.index()] as usize];
+            let seen = &maps[row.map];
+            let fragments = if faces.is_veil(face) {
+                &seen.veils
+            } else {
+                &seen.opaque
+            };
+            corners.resize_with(row.fragments.len(), Vec::new);
+            for (corners, index) in corners.iter_mut().zip(row.fragments.clone()) {
+                corners.clear();
+                if let Fragment::Cut {
+                    vertices, sides, ..
+                } = fragments.get(index)
+                {
+                    let both = vertices.iter().zip(sides);
+                    corners.extend(both.map(|(&point, &side)| Corner { point, side }));
+                }
+            }
+            clipper.resume(face, corners.iter().map(Vec::as_slice));
+            clipper.subtract_listed(face, &others[row.map], |_| true);
+            clipper.store(face, pile);
+        },
+    );
     let mut found = Found::default();
     piles.into_iter().for_each(|pile| found.add(pile));
-    let clipped = found.into_seen(&pieces.outlines);
-    Seen {
-        opaque: pieces.named(&clipped.opaque),
-        veils: pieces.named(&clipped.veils),
-    }
+    found.into_seen(faces)
 }
 
-/// The fragments of all maps, as faces that can be clipped.
-struct SeenPieces<'a> {
-    /// Polygons of the fragments, in the order of their faces.
-    outlines: Faces,
-    /// Of each fragment.
-    fragments: Vec<Fragment<'a>>,
-    map: Vec<u32>,
+/// Where fragments of a face are.
+struct Row {
+    face: FaceId,
+    map: usize,
+    /// Of the map's opaque fragments, or of its veils.
+    fragments: Range<usize>,
 }
 
-impl<'a> SeenPieces<'a> {
-    fn of(faces: &Faces, maps: &'a [Seen]) -> Self {
-        let mut fragments: Vec<(Fragment<'a>, u32)> = Vec::new();
-        for (seen, map) in maps.iter().zip(0..) {
-            let both = seen.opaque.iter().chain(seen.veils.iter());
-            fragments.extend(both.map(|fragment| (fragment, map)));
-        }
-        // Stable: fragments of a face stay in order.
-        fragments.sort_by_key(|(fragment, _)| fragment.face());
-        let mut pieces = Self {
-            outlines: Faces::with_capacity(fragments.len()),
-            fragments: Vec::with_capacity(fragments.len()),
-            map: Vec::with_capacity(fragments.len()),
+const NOT_SEEN: u32 = u32::MAX;
+
+/// The seen faces of all maps, ascending.
+fn rows(faces: &Faces, maps: &[Seen]) -> Vec<Row> {
+    let mut rows: Vec<Row> = Vec::new();
+    for (map, seen) in maps.iter().enumerate() {
+        let mut add = |fragments: &Fragments, veils: bool| {
+            for index in 0..fragments.len() {
+                let face = fragments.face(index);
+                debug_assert_eq!(faces.is_veil(face), veils, "{face:?} is in the other list");
+                match rows.last_mut() {
+                    Some(last) if last.face == face && last.map == map => last.fragments.end += 1,
+                    _ => rows.push(Row {
+                        face,
+                        map,
+                        fragments: index..index + 1,
+                    }),
+                }
+            }
         };
-        for &plane in faces.planes() {
-            pieces.outlines.push_plane(plane);
-        }
-        for (fragment, map) in fragments {
-            let face = fragment.face();
-            let polygon: &[DVec2] = match fragment {
-                Fragment::Whole(face) => faces.outline(face),
-                Fragment::Cut { vertices, .. } => vertices,
-            };
-            let plane = faces.plane(face);
-            // A fragment without area, but for rounding, shows nothing.
-            let Some(piece) = pieces.outlines.push(polygon, plane, ObjectId(0), 0) else {
-                continue;
-            };
-            if faces.is_veil(face) {
-                pieces.outlines.set_veil(piece);
-            }
-            pieces.fragments.push(fragment);
-            pieces.map.push(map);
-        }
-        pieces
+        add(&seen.opaque, false);
+        add(&seen.veils, true);
     }
-
-    /// What is left of fragments, as fragments of their faces.
-    fn named(&self, clipped: &Fragments) -> Fragments {
-        let mut named = Fragments::new();
-        for left in clipped.iter() {
-            let fragment = self.fragments[left.face().index()];
-            let face = fragment.face();
-            match (left, fragment) {
-                (Fragment::Whole(_), Fragment::Whole(_)) => named.push_whole(face),
-                (
-                    Fragment::Whole(_),
-                    Fragment::Cut {
-                        vertices, sides, ..
-                    },
-                ) => named.push_cut(face, vertices.iter().copied().zip(sides.iter().copied())),
-                (
-                    Fragment::Cut {
-                        face: piece,
-                        vertices,
-                        sides,
-                    },
-                    _,
-                ) => {
-                    let sides = sides.iter().map(|&side| self.side(face, piece, side));
-                    named.push_cut(face, vertices.iter().copied().zip(sides));
-                }
-            }
-        }
-        named
-    }
-
-    /// The name of a side of what is left of `piece`, which is of `face`.
-    fn side(&self, face: FaceId, piece: FaceId, side: Side) -> Side {
-        let cutter = self.fragments[side.face.index()];
-        if side.kind == Side::CROSSING {
-            return Side::crossing(cutter.face());
-        }
-        match cutter {
-            Fragment::Whole(whole) => Side {
-                face: whole,
-                ..side
-            },
-            Fragment::Cut { sides, .. } => {
-                let along = sides[side.kind as usize];
-                let is_own = side.face == piece;
-                if is_own || along.kind < Side::SCAN {
-                    along
-                } else {
-                    // Beyond such a side of another fragment its face goes on, or one that is nearer:
-                    // where this one is seen on one side of the line, it is on the other.
-                    Side::scan(face)
-                }
-            }
-        }
-    }
+    rows.sort_unstable_by_key(|row| row.face);
+    rows
 }

@@ -5,10 +5,11 @@
 //! their faces, and the cases are the signs of the difference of two planes, so that pictures merge
 //! exactly, also where surfaces pass through one another. All maps are merged in one pass.
 //!
-//! - [`merge`]: what is seen of several sets of faces -> what is seen of all of them. A fragment is
-//!   clipped by the fragments of the *other* maps only, and only by what was seen of them: what is
-//!   hidden in its own map stays hidden.
+//! - [`merge`]: what is seen of several sets of faces -> what is seen of all of them. What is left of a
+//!   face in its own map is clipped by the seen faces of the *other* maps only: what is hidden in its
+//!   own map stays hidden.
 //! - [`composite`]: the same for stored maps with what is seen of their scenes, which are united.
+//! - [`hold_out`]: less what is seen of maps that only hide.
 //!
 //! Coplanar faces of different maps are decided by the order of their faces: priority of the layer,
 //! name of the object, face; whatever the order of the maps.
@@ -17,4 +18,4 @@ mod merge;
 mod unite;
 
 pub use merge::merge;
-pub use unite::{CompositeError, composite};
+pub use unite::{CompositeError, composite, hold_out};

@@ -41,6 +41,17 @@ pub enum CompositeError {
 /// # Errors
 /// [`CompositeError`] for maps of different cameras or places in the world.
 pub fn composite(maps: &[SeenScene]) -> Result<SeenScene, CompositeError> {
+    hold_out(maps, &[])
+}
+
+/// [`composite`] of `maps` as far as the surfaces of `holdouts` do not hide them. Where those are seen
+/// nothing is: the picture has a hole of their exact shape.
+///
+/// # Errors
+/// As [`composite`]; indices count the maps first, then the holdouts.
+pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene, CompositeError> {
+    let shown = maps.len();
+    let maps: Vec<&SeenScene> = maps.iter().chain(holdouts).collect();
     let first = maps.first().ok_or(CompositeError::Nothing)?;
     for (index, other) in maps.iter().enumerate().skip(1) {
         if let Some(difference) = camera_difference(&first.map.camera, &other.map.camera) {
@@ -50,9 +61,9 @@ pub fn composite(maps: &[SeenScene]) -> Result<SeenScene, CompositeError> {
             return Err(CompositeError::OtherWorld { index, difference });
         }
     }
-    let united = UnitedScenes::of(maps);
+    let united = UnitedScenes::of(&maps);
     let groups = PlaneGroups::of(&united.scene);
-    let (faces, new_ids) = united.faces(maps, &groups);
+    let (faces, new_ids) = united.faces(&maps, &groups);
     let seen: Vec<Seen> = maps
         .iter()
         .zip(&new_ids)
@@ -65,7 +76,13 @@ pub fn composite(maps: &[SeenScene]) -> Result<SeenScene, CompositeError> {
         })
         .collect();
     let camera = first.map.camera;
+    let mut is_shown = vec![false; faces.len()];
+    for face in new_ids[..shown].iter().flatten() {
+        is_shown[face.index()] = true;
+    }
     let Seen { opaque, veils } = merge(&faces, &seen, camera.aspect());
+    let [opaque, veils] =
+        [opaque, veils].map(|fragments| fragments.selected(|face| is_shown[face.index()]));
     let map = VisibilityMap {
         camera,
         faces,
@@ -150,7 +167,7 @@ struct UnitedScenes {
 }
 
 impl UnitedScenes {
-    fn of(maps: &[SeenScene]) -> Self {
+    fn of(maps: &[&SeenScene]) -> Self {
         let mut scene = Scene {
             world: maps
                 .iter()
@@ -219,7 +236,7 @@ impl UnitedScenes {
 
     /// The faces of all maps as one table in the order of the objects, and of each map the new numbers
     /// of its faces. Faces of one plane share it.
-    fn faces(&self, maps: &[SeenScene], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
+    fn faces(&self, maps: &[&SeenScene], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
         let mut order: Vec<(ObjectId, FaceId, usize)> = Vec::new();
         for (map, seen) in maps.iter().enumerate() {
             let table = &seen.map.faces;

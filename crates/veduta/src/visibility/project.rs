@@ -289,7 +289,8 @@ mod tests {
     use super::*;
     use crate::scene::{Material, MeshId};
     use veduta_geometry::DMat4;
-    use veduta_map::{FaceId, MaterialId};
+    use veduta_map::FaceId;
+    use veduta_map::MaterialId;
 
     fn scene_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, double_sided: bool) -> Scene {
         let mesh = Mesh {

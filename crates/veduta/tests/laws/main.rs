@@ -1,5 +1,5 @@
-//! The laws of visibility, on random scenes: area (law 1), merge (law 2, in `merge`) and same bytes
-//! (law 5).
+//! The laws of visibility, on random scenes: area (law 1), merge (law 2, in `merge`), scale (law 3, in
+//! `zoom`) and same bytes (law 5).
 //!
 //! Every engine goes through the same scenes. A failing case prints its seed; set `VEDUTA_SEED` to
 //! look at that scene alone.
@@ -7,6 +7,7 @@
 mod merge;
 #[path = "../support/mod.rs"]
 mod support;
+mod zoom;
 
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};

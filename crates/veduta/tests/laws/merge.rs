@@ -10,7 +10,7 @@ use veduta::map::{FaceId, Faces, Fragment, Seen, Side};
 use veduta::visibility::speculative;
 
 /// Random scenes; a tenth of them are large.
-const SCENES: u64 = if cfg!(debug_assertions) { 100 } else { 3_000 };
+const SCENES: u64 = if cfg!(debug_assertions) { 100 } else { 1_200 };
 
 #[test]
 fn merged_maps_show_what_all_faces_show() {

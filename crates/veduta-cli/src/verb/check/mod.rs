@@ -2,6 +2,7 @@
 
 mod topology;
 
+use super::stored::summary;
 use super::{Reading, is_picture};
 use crate::exit::{Ending, Failure};
 use crate::talk::{Talk, counted, plain, print};
@@ -10,20 +11,23 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use topology::Topology;
+use veduta::map::file::MapReader;
 use veduta::scene::Scene;
-use veduta_io::{read_picture, read_scene};
+use veduta_io::{is_map, open_map, read_picture, read_scene};
 
-/// Read models and pictures, and report every error and warning
+/// Read models, stored maps and pictures, and report every error and warning
 ///
 /// Of meshes it is told, as information, how many faces have no area, how many edges are open (of one
 /// face only) or of more than two faces, and how many vertices no face uses. Corners at the same place
 /// count as one vertex there.
 ///
+/// Of a stored map every byte is compared with its checksum, and what it says with what maps must be.
+///
 /// Exit code 1 if a file cannot be read, or, with --strict, has warnings.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Check {
-    /// Models (.glb, .gltf, .obj) and pictures
+    /// Models, scene files, stored maps and pictures
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     #[command(flatten)]
@@ -54,6 +58,9 @@ enum Held {
     Picture {
         width: u32,
         height: u32,
+    },
+    Map {
+        summary: String,
     },
     Model {
         summary: String,
@@ -115,6 +122,16 @@ impl Check {
             warnings: Vec::new(),
             held: None,
         };
+        if is_map(file) {
+            match open_map(file).and_then(|mut map| map.read(MapReader::check)) {
+                Ok(seen) => {
+                    let summary = summary(&seen);
+                    report.held = Some(Held::Map { summary });
+                }
+                Err(error) => report.errors.push(error.to_string()),
+            }
+            return report;
+        }
         if is_picture(file) {
             match read_picture(file) {
                 Ok(loaded) => {
@@ -187,6 +204,7 @@ impl Report {
         });
         match &self.held {
             None => {}
+            Some(Held::Map { summary }) => told["map"] = summary.as_str().into(),
             Some(Held::Picture { width, height }) => told["size"] = json!([width, height]),
             Some(Held::Model { meshes, .. }) => {
                 let rows = meshes.iter().map(|mesh| {
@@ -224,7 +242,9 @@ impl Report {
             Some(Held::Picture { width, height }) => {
                 writeln!(text, "{file}: a picture of {width} x {height} pixels")?;
             }
-            Some(Held::Model { summary, .. }) => writeln!(text, "{file}: {summary}")?,
+            Some(Held::Map { summary } | Held::Model { summary, .. }) => {
+                writeln!(text, "{file}: {summary}")?
+            }
         }
         for warning in &self.warnings {
             writeln!(text, "  warning: {}", plain(warning))?;

@@ -12,10 +12,14 @@ use crate::values::Size;
 use clap::Args;
 use pick::Spot;
 use serde_json::{Value, json};
+use std::io::{Read, Seek};
 use std::path::PathBuf;
-use veduta_io::{LoadedPicture, read_picture};
+use veduta::map::SeenScene;
+use veduta::map::file::MapReader;
+use veduta::pipeline;
+use veduta_io::{LoadedPicture, is_map, open_map, read_picture};
 
-/// Tell what is inside a model or a picture
+/// Tell what is inside a model, a stored map or a picture
 ///
 /// With --pick: which object, face and material are seen at a point of the picture that `veduta
 /// render` would make with the same options, where in the world that is, and with which exact areas
@@ -23,7 +27,8 @@ use veduta_io::{LoadedPicture, read_picture};
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Info {
-    /// The model (.glb, .gltf, .obj, .stl, .ply, .city.json), scene file (.toml) or picture
+    /// The model (.glb, .gltf, .obj, .stl, .ply, .city.json), scene file (.toml), stored map (.veduta)
+    /// or picture
     file: PathBuf,
     /// List all objects, not only the first
     #[arg(long)]
@@ -61,7 +66,9 @@ impl Info {
             let message = "options of the view are for --pick; add it, or leave them out";
             return Err(Failure::new(Code::Usage, message));
         }
-        let (mut told, text) = if is_picture(&self.file) {
+        let (mut told, text) = if is_map(&self.file) {
+            self.map(talk)?
+        } else if is_picture(&self.file) {
             self.picture(talk)?
         } else {
             self.model(talk)?
@@ -84,9 +91,25 @@ impl Info {
         };
         let (camera, size) = self.view.camera(&self.file, &loaded, self.size)?;
         talk.begin("finding visibility");
-        let picked = pick::pick(&loaded.scene, &camera, size, spot)?;
+        let map = pipeline::find_visibility(&loaded.scene, &camera);
+        let picked = pick::pick(&loaded.scene, &map, size, spot)?;
         talk.end();
         Ok((picked.as_json(), picked.as_text()))
+    }
+
+    /// What a stored map holds; nothing is found anew.
+    fn map(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
+        talk.begin("reading");
+        let mut map = open_map(&self.file)?;
+        let seen = map.read(|reader| reader.read())?;
+        talk.end();
+        if let Some(spot) = self.pick {
+            let [width, height] = seen.size;
+            let size = self.size.unwrap_or(Size { width, height });
+            let picked = pick::pick(&seen.scene, &seen.map, size, spot)?;
+            return Ok((picked.as_json(), picked.as_text()));
+        }
+        Ok(map_told(&seen, map.reader(), self.all))
     }
 
     fn picture(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
@@ -107,6 +130,37 @@ impl Info {
         }
         Ok(picture_told(&loaded))
     }
+}
+
+/// What a stored map holds, as JSON and text.
+fn map_told<R: Read + Seek>(seen: &SeenScene, file: &MapReader<R>, all: bool) -> (Value, String) {
+    let mut told = model::as_json(&seen.scene);
+    let [width, height] = seen.size;
+    let (opaque, veils) = (seen.map.opaque.len(), seen.map.veils.len());
+    let sources: Vec<&str> = file
+        .sources()
+        .iter()
+        .map(|source| source.path.as_str())
+        .collect();
+    told["size"] = json!(seen.size);
+    told["facesSeen"] = seen.map.faces.len().into();
+    told["fragments"] = opaque.into();
+    told["veils"] = veils.into();
+    told["camera"] = model::camera_as_json("", &seen.map.camera);
+    told["sources"] = json!(sources);
+    told["generator"] = file.generator().into();
+    let mut text = format!(
+        "  a map of  {width} x {height} pixels, by {}\n  seen      {} faces in {} fragments, {} veils\n",
+        plain(file.generator()),
+        seen.map.faces.len(),
+        opaque,
+        veils
+    );
+    for source in sources {
+        text += &format!("  made of   {}\n", plain(source));
+    }
+    text += &model::as_text(&seen.scene, all);
+    (told, text)
 }
 
 /// What a picture holds, as JSON and text.

@@ -73,7 +73,7 @@ pub fn as_json(scene: &Scene) -> Value {
     })
 }
 
-fn camera_as_json(name: &str, camera: &Camera) -> Value {
+pub fn camera_as_json(name: &str, camera: &Camera) -> Value {
     let mut told = json!({
         "name": name,
         "eye": camera.eye_from_world.inverse().w_axis.truncate().to_array(),

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::str::FromStr;
 use veduta::dice::{PixelGrid, coverage};
-use veduta::map::{Camera, FaceId, ObjectId, VisibilityMap};
+use veduta::map::{FaceId, ObjectId, VisibilityMap};
 use veduta::pipeline;
 use veduta::scene::Scene;
 use veduta_geometry::{DVec2, DVec3};
@@ -72,8 +72,8 @@ struct Share {
     area: f64,
 }
 
-/// Finds what `camera` shows at `spot` of a picture of that size.
-pub fn pick(scene: &Scene, camera: &Camera, size: Size, spot: Spot) -> Result<Picked, Failure> {
+/// Finds what `map`, which is of `scene`, shows at `spot` of a picture of that size.
+pub fn pick(scene: &Scene, map: &VisibilityMap, size: Size, spot: Spot) -> Result<Picked, Failure> {
     let Spot(spot) = spot;
     let (width, height) = (f64::from(size.width), f64::from(size.height));
     if spot.min_element() < 0.0 || spot.x >= width || spot.y >= height {
@@ -83,14 +83,13 @@ pub fn pick(scene: &Scene, camera: &Camera, size: Size, spot: Spot) -> Result<Pi
         );
         return Err(Failure::new(Code::Usage, message));
     }
-    let map = pipeline::find_visibility(scene, camera);
     let frame = PixelGrid::of_frame(size.width, size.height);
     let corner = spot.floor();
     let pixel = frame.window(corner.x, corner.y, 1, 1);
     let seen = map
         .opaque_at(frame.image_from_pixels(spot))
-        .map(|fragment| seen_at(scene, &map, map.opaque.face(fragment), &frame, spot));
-    let mut shares: Vec<Share> = coverage(&map, &pixel)
+        .map(|fragment| seen_at(scene, map, map.opaque.face(fragment), &frame, spot));
+    let mut shares: Vec<Share> = coverage(map, &pixel)
         .into_iter()
         .map(|row| Share {
             object: scene.object(map.faces.object(row.face)).name.clone(),
@@ -100,7 +99,7 @@ pub fn pick(scene: &Scene, camera: &Camera, size: Size, spot: Spot) -> Result<Pi
         .collect();
     // Stable: of equal areas the smaller face comes first.
     shares.sort_by(|a, b| b.area.total_cmp(&a.area));
-    let picture = pipeline::render_window(scene, &map, &pixel, false);
+    let picture = pipeline::render_window(scene, map, &pixel, false);
     let world = &scene.world;
     Ok(Picked {
         spot,

@@ -1,0 +1,185 @@
+//! Stored maps: made, shaded, composited, looked into, refused.
+
+use crate::{FACING, Folder, png};
+use serde_json::json;
+
+/// The model's two squares in files of their own.
+fn folder_of_two() -> Folder {
+    let folder = Folder::new();
+    let [wall, square] = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]].map(|[low, high, z]| {
+        let corners = [[low, low], [high, low], [high, high], [low, high]];
+        let rows = corners.map(|[x, y]| format!("v {x} {y} {z}\n"));
+        format!("{}f 1 2 3 4\n", rows.concat())
+    });
+    folder.write(
+        "wall.obj",
+        format!("mtllib m.mtl\no wall\nusemtl red\n{wall}"),
+    );
+    folder.write(
+        "box.obj",
+        format!("mtllib m.mtl\no box\nusemtl blue\n{square}"),
+    );
+    for name in ["wall", "box"] {
+        folder.told(&format!("render {name}.obj {FACING} -o {name}.veduta"));
+    }
+    folder
+}
+
+#[test]
+fn a_map_gives_the_picture_without_the_scene() {
+    let folder = Folder::new();
+    folder.told(&format!("render town.obj {FACING} -o expected.png"));
+    let made = folder.json(&format!("render town.obj {FACING} -o town.veduta"));
+    assert_eq!(
+        (&made["facesSeen"], &made["facesProjected"]),
+        (&json!(2), &json!(2))
+    );
+    for file in ["town.obj", "m.mtl"] {
+        std::fs::remove_file(folder.path(file)).expect("is there");
+    }
+    let told = folder.json("shade town.veduta -o found.png");
+    assert_eq!(told["facesProjected"], 0, "nothing is found anew");
+    assert_eq!(told["facesClipped"], 0, "nothing is found anew");
+    assert!(folder.read("expected.png") == folder.read("found.png"));
+}
+
+#[test]
+fn a_scaled_window_is_cut_from_the_scaled_picture() {
+    let folder = Folder::new();
+    folder.told(&format!("render town.obj {FACING} -o town.veduta"));
+    let unlit = "--unlit --background #000";
+    folder.told(&format!(
+        "shade town.veduta --scale 3,0.5 {unlit} -o whole.npy"
+    ));
+    // As stretched as the picture, which is not square any more.
+    folder.told(&format!(
+        "shade town.veduta --size 24x4 {unlit} -o same.npy"
+    ));
+    assert!(folder.read("whole.npy") == folder.read("same.npy"));
+    folder.told(&format!("shade town.veduta --scale 2 {unlit} -o whole.png"));
+    folder.told(&format!(
+        "shade town.veduta --scale 2 --window 5,7,6,4 {unlit} -o part.png"
+    ));
+    let (width, _, whole) = png(&folder.read("whole.png"));
+    let (part_width, part_height, part) = png(&folder.read("part.png"));
+    assert_eq!((width, part_width, part_height), (16, 6, 4));
+    for (index, pixel) in part.into_iter().enumerate() {
+        let (x, y) = (5 + index % 6, 7 + index / 6);
+        assert_eq!(pixel, whole[y * width + x], "{x}, {y}");
+    }
+}
+
+#[test]
+fn materials_change_as_in_a_scene_file() {
+    let folder = Folder::new();
+    folder.told(&format!("render town.obj {FACING} -o town.veduta"));
+    folder.write("change.toml", "[material.\"r*\"]\ncolor = [0, 1, 0]\n");
+    folder.write("m.mtl", "newmtl red\nKd 0 1 0\nnewmtl blue\nKd 1 1 0\n");
+    folder.told(&format!("render town.obj {FACING} --unlit -o expected.png"));
+    folder.told(
+        "shade town.veduta --unlit --changes change.toml --set material.blue.color=#ff0 -o found.png",
+    );
+    assert!(folder.read("expected.png") == folder.read("found.png"));
+
+    let failed = folder.veduta("shade town.veduta --set material.red.colour=#ff0 -o a.png");
+    let text = failed.error_of(4);
+    assert!(
+        text.contains("--set:1:14") && text.contains("\"color\""),
+        "{text}"
+    );
+}
+
+#[test]
+fn maps_composite_to_what_both_scenes_show() {
+    let folder = folder_of_two();
+    folder.told(&format!("render town.obj {FACING} -o expected.png"));
+    for order in ["wall.veduta box.veduta", "box.veduta wall.veduta"] {
+        folder.told(&format!("composite {order} -o found.png"));
+        assert!(
+            folder.read("expected.png") == folder.read("found.png"),
+            "{order}"
+        );
+        let told = folder.json(&format!("composite {order} -o both.veduta --force"));
+        assert_eq!(told["facesProjected"], 0);
+        folder.told("shade both.veduta -o found.png");
+        assert!(
+            folder.read("expected.png") == folder.read("found.png"),
+            "{order}"
+        );
+    }
+}
+
+#[test]
+fn a_holdout_leaves_a_hole_and_a_selection_what_was_asked_for() {
+    let folder = folder_of_two();
+    let show = |arguments: &str| {
+        folder.told(&format!("composite {arguments} --unlit -o found.png"));
+        png(&folder.read("found.png")).2
+    };
+    let held_out = show("wall.veduta --holdout box.veduta");
+    let red = |pixels: &[[u8; 4]]| pixels.iter().filter(|p| **p == [255, 0, 0, 255]).count();
+    assert_eq!(
+        red(&held_out),
+        12,
+        "a quarter of the wall's 16 pixels is hidden"
+    );
+    assert_eq!(held_out.iter().filter(|pixel| pixel[3] == 0).count(), 52);
+    assert_eq!(red(&show("wall.veduta box.veduta --only wall")), 16);
+    assert_eq!(red(&show("wall.veduta box.veduta --without b*")), 16);
+    let text = folder
+        .veduta("composite wall.veduta --only wal -o a.png")
+        .error_of(3);
+    assert!(text.contains("did you mean \"wall\"?"), "{text}");
+}
+
+#[test]
+fn maps_of_other_cameras_are_refused_with_the_difference() {
+    let folder = folder_of_two();
+    folder.told("render box.obj --eye 0,-5,1 --look-at 0,0,1 --parallel 4 --size 8x8 -o b.veduta");
+    let text = folder
+        .veduta("composite wall.veduta b.veduta -o a.png")
+        .error_of(4);
+    assert!(text.contains("its eye stands at"), "{text}");
+    assert!(!folder.path("a.png").exists());
+}
+
+#[test]
+fn a_map_is_replaced_only_when_told_and_damage_is_found() {
+    let folder = Folder::new();
+    let render = format!("render town.obj {FACING} -o town.veduta");
+    folder.told(&render);
+    let text = folder.veduta(&render).error_of(2);
+    assert!(text.contains("--force"), "{text}");
+    let sound = folder.read("town.veduta");
+    folder.told(&format!("{render} --force"));
+    assert!(
+        folder.read("town.veduta") == sound,
+        "equal maps are equal files"
+    );
+    assert!(folder.told("check town.veduta").contains("2 faces seen"));
+    assert!(folder.told("info town.veduta").contains("town.obj"));
+    let picked = folder.json("info town.veduta --pick 2,5");
+    assert_eq!(picked["seen"]["object"], "box");
+
+    let mut damaged = sound;
+    damaged[700] ^= 4;
+    folder.write("town.veduta", &damaged);
+    let text = folder.veduta("shade town.veduta -o a.png").error_of(4);
+    assert!(text.contains("town.veduta: damaged in"), "{text}");
+    folder.veduta("check town.veduta").assert().code(1);
+    folder.write("town.veduta", "no map at all");
+    let text = folder.veduta("shade town.veduta -o a.png").error_of(4);
+    assert!(text.contains("not a visibility map"), "{text}");
+}
+
+/// A command that fails, and what it says then.
+trait Fails {
+    fn error_of(self, code: i32) -> String;
+}
+
+impl Fails for assert_cmd::Command {
+    fn error_of(mut self, code: i32) -> String {
+        let failed = self.assert().code(code);
+        String::from_utf8(failed.get_output().stderr.clone()).expect("text")
+    }
+}
