@@ -81,7 +81,7 @@ pub(super) fn painting(scene: &Scene, map: &VisibilityMap, regions: &[Region]) -
     let mut open: Vec<(usize, Option<u32>)> = vec![(0, None)];
     while let Some((at, parent)) = open.pop() {
         let node = &nodes[at];
-        let own = (at != 0).then(|| painting.groups.len() as u32);
+        let own = (at != 0).then_some(painting.groups.len() as u32);
         if let Some(own) = own {
             let start = painting.order.len();
             let mut far_to_near = node.regions.clone();
