@@ -61,22 +61,22 @@ impl FromStr for FieldOfView {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let radians = match text.strip_suffix("rad") {
-            Some(number) => number.trim().parse().ok(),
-            None => {
-                let number = text
-                    .strip_suffix("deg")
-                    .or(text.strip_suffix('°'))
-                    .unwrap_or(text);
-                number.trim().parse().ok().map(f64::to_radians)
-            }
-        };
-        match radians {
+        match radians(text) {
             Some(angle) if angle > 0.0 && angle < std::f64::consts::PI => Ok(Self(angle)),
             Some(_) => Err("a field of view lies above 0deg and below 180deg".into()),
             None => Err("expected an angle such as 40deg or 0.7rad".into()),
         }
     }
+}
+
+/// An angle with its unit, degrees if it has none.
+fn radians(text: &str) -> Option<f64> {
+    if let Some(number) = text.strip_suffix("rad") {
+        return number.trim().parse().ok();
+    }
+    let number = text.strip_suffix("deg").or(text.strip_suffix('°'));
+    let degrees: f64 = number.unwrap_or(text).trim().parse().ok()?;
+    Some(degrees.to_radians())
 }
 
 /// `X,Y,Z`, finite.
@@ -200,20 +200,60 @@ impl FromStr for Background {
         if PictureFormat::of(Path::new(text)).is_ok() {
             return Ok(Self::Picture(PathBuf::from(text)));
         }
-        let expected = || {
-            "expected none, a colour such as '#8ab4d8' (in quotes, since shells take # for a comment), \
-                or a picture such as sky.jpg".to_owned()
-        };
-        let digits = text.strip_prefix('#').ok_or_else(expected)?;
-        let digits: Option<Vec<u32>> = digits.chars().map(|digit| digit.to_digit(16)).collect();
-        let bytes = match digits.as_deref() {
-            Some(&[r, g, b]) => [r, g, b].map(|digit| 17 * digit),
-            Some(&[r, r2, g, g2, b, b2]) => [16 * r + r2, 16 * g + g2, 16 * b + b2],
-            _ => return Err(expected()),
-        };
-        Ok(Self::Color(
-            bytes.map(|byte| linear_from_srgb(byte as f32 / 255.0)),
-        ))
+        let expected = "expected none, a colour such as '#8ab4d8' (in quotes, since shells take # for a \
+            comment), or a picture such as sky.jpg";
+        color(text)
+            .map(Self::Color)
+            .map_err(|_| expected.to_owned())
+    }
+}
+
+/// A colour, `#rgb` or `#rrggbb` (sRGB), as linear Rec.709.
+pub fn color(text: &str) -> Result<[f32; 3], String> {
+    let expected = || "expected a colour such as '#8ab4d8'".to_owned();
+    let digits = text.strip_prefix('#').ok_or_else(expected)?;
+    let digits: Option<Vec<u32>> = digits.chars().map(|digit| digit.to_digit(16)).collect();
+    let bytes = match digits.as_deref() {
+        Some(&[r, g, b]) => [r, g, b].map(|digit| 17 * digit),
+        Some(&[r, r2, g, g2, b, b2]) => [16 * r + r2, 16 * g + g2, 16 * b + b2],
+        _ => return Err(expected()),
+    };
+    Ok(bytes.map(|byte| linear_from_srgb(byte as f32 / 255.0)))
+}
+
+/// Pixels of a millimetre, at the 96 to an inch of CSS.
+const PIXELS_PER_MM: f64 = 96.0 / 25.4;
+
+/// Width of a line in pixels: `0.5px`, `0.35mm`, or a number of pixels.
+pub fn line_width(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.strip_suffix("mm") {
+        Some(number) => (number, PIXELS_PER_MM),
+        None => (text.strip_suffix("px").unwrap_or(text), 1.0),
+    };
+    match number.trim().parse::<f64>() {
+        Ok(width) if width > 0.0 && width <= 1000.0 => Ok(width * unit),
+        _ => Err("expected a width above 0 and up to 1000, such as 0.5px or 0.35mm".into()),
+    }
+}
+
+/// How far shapes reach under others, in pixels.
+pub fn trap(text: &str) -> Result<f64, String> {
+    match text
+        .strip_suffix("px")
+        .unwrap_or(text)
+        .trim()
+        .parse::<f64>()
+    {
+        Ok(trap) if (0.0..=100.0).contains(&trap) => Ok(trap),
+        _ => Err("expected a number of pixels from 0 to 100, such as 4".into()),
+    }
+}
+
+/// An angle in radians from 0 to 180 degrees: `30deg`, `30` or `0.5rad`.
+pub fn crease_angle(text: &str) -> Result<f64, String> {
+    match radians(text) {
+        Some(angle) if (0.0..=std::f64::consts::PI).contains(&angle) => Ok(angle),
+        _ => Err("expected an angle from 0deg to 180deg, such as 30deg".into()),
     }
 }
 
@@ -305,6 +345,33 @@ mod tests {
         assert_eq!("my sky.JPG".parse(), Ok(picture));
         for text in ["ff8000", "#ff80", "#gg0000", "red", "#ff80000", "#é00"] {
             assert!(text.parse::<Background>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn widths_of_lines_are_pixels_or_millimetres() {
+        assert_eq!(line_width("0.5px"), Ok(0.5));
+        assert_eq!(line_width("2"), Ok(2.0));
+        assert_eq!(line_width("25.4mm"), Ok(96.0));
+        for text in ["0", "-1px", "nan", "1e9mm", "px", "1cm"] {
+            assert!(line_width(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn traps_have_some_width_or_none() {
+        assert_eq!((trap("0"), trap("2.5px")), (Ok(0.0), Ok(2.5)));
+        for text in ["-1", "101", "nan", "2mm", ""] {
+            assert!(trap(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn crease_angles_may_be_nothing_or_all_round() {
+        assert_eq!(crease_angle("0"), Ok(0.0));
+        assert_eq!(crease_angle("180deg"), Ok(std::f64::consts::PI));
+        for text in ["-1deg", "181", "nan", "4rad", ""] {
+            assert!(crease_angle(text).is_err(), "{text}");
         }
     }
 

@@ -54,3 +54,7 @@ pub use write::{
 };
 #[cfg(feature = "exr")]
 pub use write::{Layers, stream_layers, write_layers};
+#[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
+pub use write::{
+    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
+};

@@ -12,6 +12,7 @@ mod buckets;
 mod clip;
 pub mod composite;
 pub mod dice;
+pub mod drawing;
 pub mod pipeline;
 pub mod scene;
 pub mod shade;

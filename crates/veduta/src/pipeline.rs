@@ -8,6 +8,7 @@ pub use deep::render_deep;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};
+use crate::drawing::{self, Drawing, Evenness, Look};
 use crate::scene::{AlphaMode, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
@@ -288,6 +289,86 @@ impl Canvas {
     }
 }
 
+/// Draws a map of `scene`, which must be the scene that the map was made of, as shapes and lines, in a
+/// picture of `grid`.
+///
+/// Each shape has one colour: that of its faces, or where it differs from point to point (textures,
+/// smooth normals, colours at corners) the mean over what [`render_window`] shows of the face.
+pub fn draw_window(
+    scene: &Scene,
+    map: &VisibilityMap,
+    grid: &PixelGrid,
+    unlit: bool,
+    settings: &drawing::Settings,
+) -> Drawing {
+    let looks = looks(scene, map, grid, unlit);
+    drawing::draw(scene, map, &looks, grid, settings)
+}
+
+/// What each fragment looks like; the same for all of a face.
+fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Vec<Look> {
+    let textures = Textures::new(scene, &materials_seen(scene, map));
+    let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+    let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
+    let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
+    // Of each fragment that is not even: the sum of area times radiance, and of area.
+    let mut sums = vec![[0.0; 4]; shown.len()];
+    if (0..shown.len() as u32).any(|fragment| surfaces.varies(fragment)) {
+        let bands = Bands::new(map, *grid);
+        let of_bands: Vec<Vec<(u32, [f64; 4])>> = (0..bands.len())
+            .into_par_iter()
+            .map_init(BandBuffers::default, |buffers, band| {
+                buffers.fragment_sums(&surfaces, map, &bands, band)
+            })
+            .collect();
+        // In the order of bands, whichever was ready first.
+        for (fragment, sum) in of_bands.into_iter().flatten() {
+            add(&mut sums[fragment as usize], sum);
+        }
+    }
+    let mut looks = Vec::with_capacity(shown.len());
+    for fragments in shown.chunk_by(|a, b| a == b) {
+        let first = looks.len();
+        let mut sum = [0.0; 4];
+        for of_fragment in &sums[first..first + fragments.len()] {
+            add(&mut sum, *of_fragment);
+        }
+        let (object, source) = (faces.object(fragments[0]), faces.source(fragments[0]));
+        let material = scene.mesh_of(object).material_of(source);
+        let textures = scene.material(material);
+        let has_picture =
+            textures.base_color_texture.is_some() || textures.emissive_texture.is_some();
+        let (radiance, evenness) = match surfaces.constant(first as u32) {
+            Some(radiance) => (radiance, Evenness::Even),
+            None => {
+                let [r, g, b, area] = sum;
+                // An area too small for a float is too small to be seen: any colour will do.
+                let mean = |sum: f64| if area > 0.0 { (sum / area) as f32 } else { 0.0 };
+                let evenness = if has_picture {
+                    Evenness::Picture
+                } else {
+                    Evenness::Gradual
+                };
+                ([r, g, b].map(mean), evenness)
+            }
+        };
+        let look = Look {
+            object,
+            material,
+            radiance,
+            evenness,
+        };
+        looks.extend(fragments.iter().map(|_| look));
+    }
+    looks
+}
+
+fn add(sum: &mut [f64; 4], other: [f64; 4]) {
+    for (channel, other) in sum.iter_mut().zip(other) {
+        *channel += other;
+    }
+}
+
 /// Makes a picture of what multiscan found.
 fn render_spans(
     scene: &Scene,
@@ -377,6 +458,44 @@ struct BandBuffers {
 }
 
 impl BandBuffers {
+    /// Of the fragments in a band that are not even, ascending: the sum of area times radiance, and of
+    /// area.
+    fn fragment_sums(
+        &mut self,
+        surfaces: &Surfaces,
+        map: &VisibilityMap,
+        bands: &Bands,
+        band: usize,
+    ) -> Vec<(u32, [f64; 4])> {
+        let (grid, parts) = (bands.grid(), &mut self.parts);
+        let varies = |fragment| surfaces.varies(fragment);
+        dice::dice(map, bands, band, varies, &mut self.dicer, parts);
+        // Only what is not even costs anything to shade.
+        parts.boundary.retain(|part| varies(part.fragment));
+        parts.runs.retain(|run| varies(run.fragment));
+        surfaces.shade(parts, grid, bands.rows(band).start, &mut self.radiance);
+        let mut values: Vec<(u32, [f64; 4])> = Vec::new();
+        let weighted = |area: f64, [r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c| area * f64::from(c));
+        for (part, &radiance) in parts.boundary.iter().zip(&self.radiance.boundary) {
+            values.push((part.fragment, weighted(f64::from(part.area), radiance)));
+        }
+        for (index, run) in parts.runs.iter().enumerate() {
+            let mut sum = [0.0; 4];
+            for &radiance in self.radiance.of_run(index) {
+                add(&mut sum, weighted(1.0, radiance));
+            }
+            values.push((run.fragment, sum));
+        }
+        values.sort_by_key(|value| value.0);
+        let of_fragments = values.chunk_by(|a, b| a.0 == b.0);
+        let sum_up = |values: &[(u32, [f64; 4])]| {
+            let mut sum = [0.0; 4];
+            values.iter().for_each(|value| add(&mut sum, value.1));
+            (values[0].0, sum)
+        };
+        of_fragments.map(sum_up).collect()
+    }
+
     /// Shades the parts of a band that begins at `first_row`, and sums them up.
     fn finish(
         &mut self,

@@ -105,6 +105,18 @@ impl Development {
         ev
     }
 
+    /// The colour behind a vector picture, if there is one.
+    pub fn plain_background(&self) -> Result<Option<[f32; 3]>, Failure> {
+        match &self.backdrop {
+            Backdrop::None => Ok(None),
+            Backdrop::Color(color) => Ok(Some(*color)),
+            Backdrop::Picture(_) => {
+                let message = "a vector picture has a background of one colour, or none";
+                Err(Failure::new(Code::Usage, message))
+            }
+        }
+    }
+
     /// [`Development::develop`] with an exposure that is known.
     pub fn develop_at(&self, picture: &mut Picture, ev: f32, for_display: bool) {
         if ev != 0.0 {

@@ -14,6 +14,7 @@ pub mod render;
 pub mod schema;
 pub mod shade;
 mod stored;
+mod vector;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;

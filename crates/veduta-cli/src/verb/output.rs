@@ -1,6 +1,7 @@
 //! Where a picture goes, and as what.
 
 use super::deep::DeepTarget;
+use super::vector::VectorTarget;
 use crate::exit::{Code, Failure};
 use crate::preview::Style;
 use crate::values::Size;
@@ -10,8 +11,9 @@ use std::path::{Path, PathBuf};
 use veduta::accumulate::{AovSettings, Picture};
 use veduta_io::deep_exr::DeepCompression;
 use veduta_io::{
-    ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples, WriteProblem,
-    is_map, reason, stream_layers, stream_picture, write_layers, write_picture_as,
+    ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples,
+    VECTOR_SUFFIXES, VectorFormat, WriteProblem, is_map, reason, stream_layers, stream_picture,
+    write_layers, write_picture_as,
 };
 
 /// Where a picture goes, and as what.
@@ -21,9 +23,9 @@ pub struct Output {
     /// The picture; its suffix chooses the format. - writes to stdout, as .png or as --format says
     #[arg(short, long, value_name = "FILE", required_unless_present = "preview")]
     output: Option<PathBuf>,
-    /// The format, whatever the suffix: png, jpg, tif, webp, exr, pfm or npy
+    /// The format, whatever the suffix: png, jpg, tif, webp, exr, pfm, npy, svg, pdf or geojson
     #[arg(long, value_name = "FORMAT", value_parser = format, requires = "output")]
-    format: Option<PictureFormat>,
+    format: Option<Format>,
     /// Bits of a channel: 8, 16, half or float. 8 by default for .png and .tif, float for .exr
     #[arg(long, value_name = "BITS", requires = "output")]
     depth: Option<DepthArgument>,
@@ -115,9 +117,17 @@ enum AovArgument {
 const USUAL_RANKS: u8 = 6;
 
 /// `--format`
-fn format(name: &str) -> Result<PictureFormat, String> {
-    PictureFormat::of_suffix(name)
-        .ok_or_else(|| format!("expected one of {}", PICTURE_SUFFIXES.join(", ")))
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Pixels(PictureFormat),
+    Vector(VectorFormat),
+}
+
+fn format(name: &str) -> Result<Format, String> {
+    let pixels = PictureFormat::of_suffix(name).map(Format::Pixels);
+    let format = pixels.or_else(|| VectorFormat::of_suffix(name).map(Format::Vector));
+    let known = [PICTURE_SUFFIXES, VECTOR_SUFFIXES].concat().join(", ");
+    format.ok_or_else(|| format!("expected one of {known}"))
 }
 
 /// A place for a picture, checked as far as it can be before there is one.
@@ -130,8 +140,9 @@ pub struct Target {
     pub linear: bool,
 }
 
+/// Where a picture goes.
 #[derive(Debug)]
-enum Place {
+pub enum Place {
     Stdout,
     File(PathBuf),
 }
@@ -146,15 +157,39 @@ impl Output {
         output.filter(|output| self.format.is_none() && is_map(output))
     }
 
-    /// The place of a picture asked for, if one is.
-    ///
-    /// `input` is the file that the picture is made of.
-    pub fn target(&self, input: &Path, json: bool) -> Result<Option<Target>, Failure> {
+    /// The place for a vector picture of `input`, if one is asked for.
+    pub fn vector_target(&self, input: &Path, json: bool) -> Result<Option<VectorTarget>, Failure> {
         let Some(output) = &self.output else {
             return Ok(None);
         };
+        let format = match self.format {
+            Some(Format::Vector(format)) => Some(format),
+            Some(Format::Pixels(_)) => None,
+            None => VectorFormat::of(output),
+        };
+        let Some(format) = format else {
+            return Ok(None);
+        };
+        let for_pixels = [
+            (self.depth.is_some(), "--depth"),
+            (self.quality.is_some(), "--quality"),
+            (self.compression.is_some(), "--compression"),
+            (self.tile.is_some(), "--tile"),
+            (self.preview.is_some(), "--preview"),
+            (!self.aov.is_empty(), "--aov"),
+        ];
+        if let Some((_, option)) = for_pixels.into_iter().find(|(is_given, _)| *is_given) {
+            let message = format!("{option} is for pictures of pixels, not for vector pictures");
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let place = self.place(input, output, json)?;
+        Ok(Some(VectorTarget { place, format }))
+    }
+
+    /// Where `output` leads.
+    fn place(&self, input: &Path, output: &Path, json: bool) -> Result<Place, Failure> {
         let usage = |message: String| Err(Failure::new(Code::Usage, message));
-        let place = if output.as_os_str() == "-" {
+        if output.as_os_str() == "-" {
             if json {
                 return usage("-o - and --json both write to stdout; leave one out".into());
             }
@@ -168,16 +203,30 @@ impl Output {
                         .into(),
                 );
             }
-            Place::Stdout
+            Ok(Place::Stdout)
         } else {
             refuse_output_nowhere(output)?;
             let name = input.with_extension("png");
             let name = name.file_name().unwrap_or("picture.png".as_ref());
             refuse_folder(output, &name.to_string_lossy())?;
-            Place::File(output.clone())
+            Ok(Place::File(output.to_owned()))
+        }
+    }
+
+    /// The place for a picture of pixels, if one is asked for.
+    ///
+    /// `input` is the file that the picture is made of.
+    pub fn target(&self, input: &Path, json: bool) -> Result<Option<Target>, Failure> {
+        let Some(output) = &self.output else {
+            return Ok(None);
         };
+        let usage = |message: String| Err(Failure::new(Code::Usage, message));
+        let place = self.place(input, output, json)?;
         let format = match (self.format, &place) {
-            (Some(format), _) => format,
+            (Some(Format::Pixels(format)), _) => format,
+            (Some(Format::Vector(_)), _) => {
+                return usage("this verb makes pictures of pixels only".into());
+            }
             (None, Place::Stdout) => PictureFormat::Png,
             (None, Place::File(path)) => PictureFormat::of(path)?,
         };
@@ -343,9 +392,16 @@ impl Target {
 
     /// The name to tell.
     pub fn name(&self) -> String {
-        match &self.place {
-            Place::Stdout => "-".to_owned(),
-            Place::File(path) => path.to_string_lossy().into_owned(),
+        self.place.name()
+    }
+}
+
+impl Place {
+    /// The name to tell.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Stdout => "-".to_owned(),
+            Self::File(path) => path.to_string_lossy().into_owned(),
         }
     }
 }

@@ -2,6 +2,7 @@ use super::deep::DeepTarget;
 use super::look::Look;
 use super::output::{Output, Target};
 use super::stored::{refuse_place, summary, tell_work};
+use super::vector::{Subject, Vector, VectorTarget};
 use super::{Reading, load, tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
@@ -25,6 +26,10 @@ use veduta_io::{Layers, Loaded, scaled, source_of, write_map};
 ///
 /// Pictures for a display (.png, .jpg, .webp, .tif of 8 or 16 bits) are exposed and toned unless told;
 /// those for further work (.exr, .pfm, .npy, .tif of floats) are linear and left as they are.
+///
+/// Vector pictures (.svg, .pdf, .geojson) have one shape for neighbouring faces in one plane that look
+/// alike, named as their objects are, without seams. A shape has one colour: the mean, where it has a
+/// texture, smooth normals or colours at its corners. Lines are visible edges; hidden ones are not drawn.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Render {
@@ -57,6 +62,8 @@ pub struct Render {
     view: View,
     #[command(flatten)]
     look: Look,
+    #[command(flatten)]
+    vector: Vector,
 }
 
 const EXAMPLES: &str = "\
@@ -73,6 +80,10 @@ Examples:
       veduta render town.obj -o deep.exr --deep --depth half
   With depth and mattes of all objects:
       veduta render town.obj -o town.exr --aov depth,normal,crypto-object
+  A drawing for print, with lines of a quarter of a millimetre:
+      veduta render town.obj -o town.pdf --lines crease --line-width 0.25mm
+  Lines only, for an illustration:
+      veduta render town.obj -o a.svg --fill none --lines silhouette,crease
   What is seen, kept for any number of pictures:
       veduta render town.obj -o kept.veduta
   Onto a photograph, through a pipe:
@@ -117,6 +128,10 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if let Some(target) = self.output.vector_target(&self.model, json)? {
+            return self.draw(&target, json, talk);
+        }
+        self.vector.refuse()?;
         if let Some(place) = self.output.map_place() {
             return self.run_to_map(place, force, json, talk);
         }
@@ -260,6 +275,40 @@ impl Render {
                 "samples": samples,
                 "warnings": talk.warnings(),
             });
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// Makes a vector picture.
+    fn draw(&self, target: &VectorTarget, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if self.sampling != Sampling::Exact || self.deep {
+            let message =
+                "a vector picture is made of exact regions; leave --sampling and --deep out";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let settings = self.vector.drawing(target.format)?;
+        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
+        let development = self.look.development(&scene, self.strict, talk)?;
+        talk.begin("finding visibility");
+        let map = pipeline::find_visibility(&scene, &camera);
+        let subject = Subject {
+            file: &self.model,
+            scene: &scene,
+            map: &map,
+            grid: &PixelGrid::of_frame(size.width, size.height),
+            unlit: self.look.unlit,
+            strict: self.strict,
+        };
+        let mut told = self
+            .vector
+            .draw(target, &settings, &subject, &development, talk)?;
+        if json {
+            told["faces"] = scene.face_count().into();
+            told["warnings"] = talk.warnings().into();
             print(&format!("{told}\n"))?;
         }
         Ok(())

@@ -3,6 +3,7 @@
 use super::look::Look;
 use super::output::Output;
 use super::stored::{Changes, open, tell_work};
+use super::vector::{Subject, Vector};
 use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
@@ -10,6 +11,7 @@ use crate::values::{self, Size};
 use clap::Args;
 use std::path::PathBuf;
 use veduta::dice::PixelGrid;
+use veduta::drawing::LineKind;
 use veduta::pipeline;
 use veduta_geometry::DVec2;
 use veduta_io::Layers;
@@ -42,6 +44,8 @@ pub struct Shade {
     output: Output,
     #[command(flatten)]
     look: Look,
+    #[command(flatten)]
+    vector: Vector,
 }
 
 const EXAMPLES: &str = "\
@@ -58,13 +62,32 @@ Examples:
 
 impl Shade {
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        let Some(target) = self.output.target(&self.map, json)? else {
-            let message = "a map is shown by -o FILE; --preview is for veduta render";
-            return Err(Failure::new(Code::Usage, message));
-        };
         if self.window.is_some() && self.output.has_numbers() {
             let message = "numbers of objects, materials and faces are those of a whole map; leave \
                 --window out, or ask for --aov crypto-object";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let vector = match self.output.vector_target(&self.map, json)? {
+            Some(target) => {
+                let settings = self.vector.drawing(target.format)?;
+                if settings.lines.contains(&LineKind::Boundary) {
+                    let message = "a map holds the faces that are seen, so that it cannot tell which \
+                        edges have a single one; draw boundaries by veduta render";
+                    return Err(Failure::new(Code::Usage, message));
+                }
+                Some((target, settings))
+            }
+            None => {
+                self.vector.refuse()?;
+                None
+            }
+        };
+        let pixels = match vector {
+            Some(_) => None,
+            None => self.output.target(&self.map, json)?,
+        };
+        if vector.is_none() && pixels.is_none() {
+            let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         }
         talk.begin("reading");
@@ -83,7 +106,9 @@ impl Shade {
                 (DVec2::ZERO, size)
             }
         };
-        target.refuse_size(size)?;
+        if let Some(target) = &pixels {
+            target.refuse_size(size)?;
+        }
         let grid = PixelGrid {
             width: size.width,
             height: size.height,
@@ -96,34 +121,49 @@ impl Shade {
         let bytes_read = map.reader().bytes_read();
         self.changes.apply(&mut seen.scene, self.strict, talk)?;
         let development = self.look.development(&seen.scene, self.strict, talk)?;
-        talk.begin("shading");
-        let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
-        tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
-        let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
-        let (mut picture, aovs) =
-            pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
-        let layers = Layers {
-            aovs: &aovs,
-            scene: &seen.scene,
-            camera: &seen.map.camera,
-            grid,
-        };
-        tell_of_mattes(&self.map, &layers, self.strict, talk)?;
-        talk.begin("developing");
-        let ev = development.develop(&mut picture, !target.linear);
-        talk.begin("writing");
-        target.write(&picture, self.output.has_layers().then_some(&layers))?;
-        talk.end();
-        talk.detail(format_args!("exposure {ev:.2} EV"));
-        if json {
-            let mut told = serde_json::json!({
+        let mut told = if let Some((target, settings)) = &vector {
+            let subject = Subject {
+                file: &self.map,
+                scene: &seen.scene,
+                map: &seen.map,
+                grid: &grid,
+                unlit: self.look.unlit,
+                strict: self.strict,
+            };
+            self.vector
+                .draw(target, settings, &subject, &development, talk)?
+        } else if let Some(target) = &pixels {
+            talk.begin("shading");
+            let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
+            tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
+            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
+            let (mut picture, aovs) =
+                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+            let layers = Layers {
+                aovs: &aovs,
+                scene: &seen.scene,
+                camera: &seen.map.camera,
+                grid,
+            };
+            tell_of_mattes(&self.map, &layers, self.strict, talk)?;
+            talk.begin("developing");
+            let ev = development.develop(&mut picture, !target.linear);
+            talk.begin("writing");
+            target.write(&picture, self.output.has_layers().then_some(&layers))?;
+            talk.end();
+            talk.detail(format_args!("exposure {ev:.2} EV"));
+            serde_json::json!({
                 "output": target.name(),
                 "size": [size.width, size.height],
-                "facesSeen": seen.map.faces.len(),
-                "bytesRead": bytes_read,
                 "exposure": ev,
-                "warnings": talk.warnings(),
-            });
+            })
+        } else {
+            unreachable!("one of the two was asked for")
+        };
+        if json {
+            told["facesSeen"] = seen.map.faces.len().into();
+            told["bytesRead"] = bytes_read.into();
+            told["warnings"] = talk.warnings().into();
             tell_work(&mut told);
             print(&format!("{told}\n"))?;
         }

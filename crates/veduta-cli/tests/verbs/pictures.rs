@@ -268,3 +268,70 @@ fn a_stored_map_has_the_same_channels() {
     }
     folder.told("shade kept.veduta -o a.exr --aov crypto-object --window 0,0,2,2");
 }
+
+#[test]
+fn vector_pictures_have_a_shape_for_each_surface_in_the_pixels_colour() {
+    let folder = Folder::new();
+    let render = format!("render town.obj {FACING}");
+    folder.told(&format!("{render} -o a.png"));
+    let made = folder.json(&format!("{render} -o a.svg --lines silhouette"));
+    assert_eq!(
+        (&made["shapes"], &made["meanShapes"]),
+        (&2.into(), &0.into())
+    );
+    assert!(made["lines"].as_u64() > Some(0));
+    let svg = String::from_utf8(folder.read("a.svg")).expect("text");
+    let (width, _, pixels) = png(&folder.read("a.png"));
+    // Within the wall, and within the box that stands before its lower left quarter.
+    for (name, [x, y]) in [("wall", [5, 2]), ("box", [2, 5])] {
+        let [r, g, b, _] = pixels[y * width + x];
+        let long = format!("#{r:02x}{g:02x}{b:02x}");
+        let group = &svg[svg.find(&format!("<title>{name}</title>")).expect(name)..];
+        let fill = group.split('"').nth(1).expect("a fill");
+        let digits: Vec<char> = fill.chars().skip(1).collect();
+        let told = match digits.len() {
+            3 => format!(
+                "#{}",
+                digits.iter().flat_map(|d| [d, d]).collect::<String>()
+            ),
+            _ => fill.to_owned(),
+        };
+        assert_eq!(told, long, "{name}");
+    }
+    for name in ["a.pdf", "a.geojson", "a.veduta"] {
+        folder.told(&format!("{render} -o {name}"));
+    }
+    folder.told("shade a.veduta -o b.svg --lines silhouette");
+    let [one, other] = ["a.svg", "b.svg"].map(|name| {
+        let svg = String::from_utf8(folder.read(name)).expect("text");
+        svg.lines().skip(2).collect::<Vec<_>>().join("\n")
+    });
+    assert_eq!(one, other, "all but the title");
+    let piped = folder.veduta(&format!("{render} -o - --format svg --lines silhouette"));
+    let piped = { piped }.assert().success().get_output().stdout.clone();
+    assert_eq!(piped, folder.read("a.svg"));
+}
+
+#[test]
+fn options_of_pixels_and_of_vector_pictures_are_not_mixed() {
+    let folder = Folder::new();
+    folder.told(&format!("render town.obj {FACING} -o sky.png"));
+    for (arguments, message) in [
+        ("-o a.png --lines crease", "--lines is for vector pictures"),
+        ("-o a.svg --depth 16", "--depth is for pictures of pixels"),
+        ("-o a.svg --fill none", "leaves nothing to draw"),
+        (
+            "-o a.geojson --lines crease",
+            "--lines is for .svg and .pdf",
+        ),
+        ("-o a.geojson --trap 1", "--trap is for .svg and .pdf"),
+        ("-o a.svg --sampling multiscan:3", "leave --sampling out"),
+        ("-o a.svg --background sky.png", "background of one colour"),
+    ] {
+        let failed = folder.veduta(&format!("render town.obj {FACING} {arguments}"));
+        let failed = { failed }.assert().code(2);
+        let told = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
+        assert!(told.contains(message), "{arguments}: {told}");
+        assert!(!folder.path("a.svg").exists());
+    }
+}

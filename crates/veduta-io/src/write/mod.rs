@@ -22,6 +22,8 @@ mod pfm;
 mod png;
 #[cfg(feature = "tiff")]
 mod tiff;
+#[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
+mod vector;
 #[cfg(feature = "webp")]
 mod webp;
 
@@ -30,6 +32,10 @@ pub use self::exr::Layers;
 pub use model::{MODEL_SUFFIXES, write_model};
 pub(crate) use partial_file::PartialFile;
 pub use partial_file::remove_unfinished;
+#[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
+pub use vector::{
+    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
+};
 
 use std::fmt;
 use std::io::{self, Cursor, Seek, Write};

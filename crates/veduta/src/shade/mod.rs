@@ -150,6 +150,14 @@ impl<'a> Surfaces<'a> {
         matches!(self.surfaces[fragment as usize], Surface::Varying(_))
     }
 
+    /// The radiance of a fragment, if it is the same at all points of it.
+    pub fn constant(&self, fragment: u32) -> Option<[f32; 3]> {
+        match self.surfaces[fragment as usize] {
+            Surface::Constant(radiance) => Some(radiance),
+            Surface::Varying(_) => None,
+        }
+    }
+
     /// Radiance of `parts`, of the band of `grid` that starts at row `first_row`. `radiance` is
     /// overwritten.
     pub fn shade(&self, parts: &Parts, grid: &PixelGrid, first_row: u32, radiance: &mut Radiance) {

@@ -1,0 +1,285 @@
+//! Vector pictures: what is drawn, and where it goes.
+
+use super::look::Development;
+use super::output::Place;
+use super::tell_shortcomings;
+use crate::exit::{Code, Failure};
+use crate::talk::Talk;
+use crate::values;
+use clap::{Args, ValueEnum};
+use serde_json::Value;
+use std::io;
+use std::path::Path;
+use veduta::accumulate::Picture;
+use veduta::dice::PixelGrid;
+use veduta::drawing::{self, Drawing, Evenness, LineKind, Shape};
+use veduta::map::VisibilityMap;
+use veduta::pipeline;
+use veduta::scene::Scene;
+use veduta_io::{VectorFormat, VectorOptions, WriteProblem, stream_drawing, write_drawing};
+
+/// What a vector picture shows.
+///
+/// All are options so that one that has no effect on a picture of pixels is refused there.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Vector pictures (.svg, .pdf, .geojson)")]
+pub struct Vector {
+    /// What fills shapes: faces, their colours; none, for lines only
+    #[arg(long, value_name = "WHAT")]
+    fill: Option<Fill>,
+    /// Visible edges to draw as lines: silhouette, boundary (of a single face), crease; several with
+    /// commas between them
+    #[arg(long, value_name = "KINDS", value_delimiter = ',')]
+    lines: Vec<Line>,
+    /// Width of the lines, such as 0.5px or 0.35mm (96 pixels to 25.4 mm); 1px by default
+    #[arg(long, value_name = "WIDTH", value_parser = values::line_width)]
+    line_width: Option<f64>,
+    /// Colour of the lines, such as #204060; black by default
+    #[arg(long, value_name = "COLOUR", value_parser = values::color)]
+    line_color: Option<[f32; 3]>,
+    /// The angle between two faces from which on their edge is a crease; 30deg by default
+    #[arg(long, value_name = "ANGLE", value_parser = values::crease_angle)]
+    crease_angle: Option<f64>,
+    /// How far shapes reach under those on top of them, in pixels, so that viewers show no seams; 4 by
+    /// default, enough to view the picture at three quarters of its size. 0 for outlines as they are seen
+    #[arg(long, value_name = "PIXELS", value_parser = values::trap)]
+    trap: Option<f64>,
+    /// Decimals of coordinates, in pixels: 0 to 9; 3 by default
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=9))]
+    decimals: Option<u8>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Fill {
+    /// The colour of the faces
+    Faces,
+    /// Nothing
+    None,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Line {
+    /// Where something ends before something farther away
+    Silhouette,
+    /// Edges of a single face
+    Boundary,
+    /// Edges of two faces at an angle, and where faces pierce one another
+    Crease,
+}
+
+impl Vector {
+    /// Fails if an option is given, for a picture of pixels.
+    pub fn refuse(&self) -> Result<(), Failure> {
+        let given = [
+            (self.fill.is_some(), "--fill"),
+            (!self.lines.is_empty(), "--lines"),
+            (self.line_width.is_some(), "--line-width"),
+            (self.line_color.is_some(), "--line-color"),
+            (self.crease_angle.is_some(), "--crease-angle"),
+            (self.trap.is_some(), "--trap"),
+            (self.decimals.is_some(), "--decimals"),
+        ];
+        match given.into_iter().find(|(is_given, _)| *is_given) {
+            None => Ok(()),
+            Some((_, option)) => {
+                let message = format!("{option} is for vector pictures: .svg, .pdf or .geojson");
+                Err(Failure::new(Code::Usage, message))
+            }
+        }
+    }
+
+    /// Whether shapes are to be filled.
+    fn has_shapes(&self) -> bool {
+        self.fill != Some(Fill::None)
+    }
+
+    /// What is to be drawn for a file of that format.
+    pub fn drawing(&self, format: VectorFormat) -> Result<drawing::Settings, Failure> {
+        let usage = |message: &str| Err(Failure::new(Code::Usage, message));
+        let has_lines = !self.lines.is_empty();
+        if !self.has_shapes() && !has_lines {
+            return usage("--fill none leaves nothing to draw without --lines");
+        }
+        if has_lines && !format.has_lines() {
+            return usage("--lines is for .svg and .pdf: .geojson holds shapes");
+        }
+        if self.trap.is_some() && !format.has_lines() {
+            return usage(
+                "--trap is for .svg and .pdf: shapes of .geojson end where they are seen to",
+            );
+        }
+        let usual = drawing::Settings::default();
+        Ok(drawing::Settings {
+            // Shapes of GeoJSON are for measuring.
+            trap: match self.trap {
+                Some(trap) => trap,
+                None if format.has_lines() => usual.trap,
+                None => 0.0,
+            },
+            shapes: self.has_shapes(),
+            lines: self
+                .lines
+                .iter()
+                .map(|line| match line {
+                    Line::Silhouette => LineKind::Silhouette,
+                    Line::Boundary => LineKind::Boundary,
+                    Line::Crease => LineKind::Crease,
+                })
+                .collect(),
+            crease_angle: self.crease_angle.unwrap_or(usual.crease_angle),
+        })
+    }
+
+    /// Draws `subject` and writes it to `target`; returns what `--json` tells of it.
+    pub fn draw(
+        &self,
+        target: &VectorTarget,
+        settings: &drawing::Settings,
+        subject: &Subject,
+        development: &Development,
+        talk: &mut Talk,
+    ) -> Result<Value, Failure> {
+        let Subject {
+            file,
+            scene,
+            map,
+            grid,
+            unlit,
+            strict,
+        } = *subject;
+        let background = development.plain_background()?;
+        let shortcomings = pipeline::shortcomings(scene, map);
+        tell_shortcomings(file, scene, &shortcomings, strict, talk)?;
+        talk.begin("drawing");
+        let mut drawing = pipeline::draw_window(scene, map, grid, unlit, settings);
+        let mut ev = 0.0;
+        if settings.shapes {
+            tell_means(&drawing, file, strict, talk)?;
+            // Exposed as the picture of pixels would be: automatic exposure looks at those.
+            talk.begin("developing");
+            let mut picture = pipeline::render_window(scene, map, grid, unlit);
+            ev = development.develop(&mut picture, true);
+            let mut colors = picture_of_colors(&drawing);
+            development.develop_at(&mut colors, ev, true);
+            for (shape, &[r, g, b, _]) in drawing.shapes.iter_mut().zip(&colors.pixels) {
+                shape.radiance = [r, g, b];
+            }
+        }
+        talk.begin("writing");
+        let title = file.file_name().unwrap_or_default().to_string_lossy();
+        target.write(&drawing, &self.options(title.into_owned(), background))?;
+        talk.end();
+        let (shapes, strokes) = (drawing.shapes.len(), drawing.strokes.len());
+        talk.detail(format_args!(
+            "{} fragments, {shapes} shapes, {strokes} lines, exposure {ev:.2} EV",
+            map.opaque.len()
+        ));
+        Ok(serde_json::json!({
+            "output": target.place.name(),
+            "size": [grid.width, grid.height],
+            "fragments": map.opaque.len(),
+            "shapes": shapes,
+            "meanShapes": uneven_shapes(&drawing),
+            "lines": strokes,
+            "exposure": ev,
+        }))
+    }
+
+    /// How the file is to be written.
+    fn options(&self, title: String, background: Option<[f32; 3]>) -> VectorOptions {
+        let usual = VectorOptions::default();
+        VectorOptions {
+            decimals: self.decimals.unwrap_or(usual.decimals),
+            background,
+            line_width: self.line_width.unwrap_or(usual.line_width),
+            line_color: self.line_color.unwrap_or(usual.line_color),
+            title,
+        }
+    }
+}
+
+/// What is drawn.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// Where it comes from, for messages.
+    pub file: &'a Path,
+    pub scene: &'a Scene,
+    pub map: &'a VisibilityMap,
+    pub grid: &'a PixelGrid,
+    /// Without light.
+    pub unlit: bool,
+    /// Warnings are errors.
+    pub strict: bool,
+}
+
+/// Warns of shapes that have more than one colour; if strict, fails.
+fn tell_means(
+    drawing: &Drawing,
+    file: &Path,
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    let uneven = uneven_shapes(drawing);
+    if uneven == 0 {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: {uneven} of {} shapes have the mean of their colours, which differ from point to point \
+         (textures, smooth normals, colours at corners)",
+        file.display(),
+        drawing.shapes.len()
+    );
+    if strict {
+        let message = format!("{message} (an error because of --strict)");
+        return Err(Failure::new(Code::Unsupported, message));
+    }
+    talk.warn(message);
+    Ok(())
+}
+
+/// How many shapes have the mean of several colours.
+fn uneven_shapes(drawing: &Drawing) -> usize {
+    let shapes = drawing.shapes.iter();
+    shapes
+        .filter(|shape| shape.evenness != Evenness::Even)
+        .count()
+}
+
+/// A pixel for each shape, so that their colours are developed as those of pictures are.
+fn picture_of_colors(drawing: &Drawing) -> Picture {
+    let pixel = |shape: &Shape| {
+        let [r, g, b] = shape.radiance;
+        [r, g, b, 1.0]
+    };
+    Picture {
+        width: drawing.shapes.len() as u32,
+        height: 1,
+        pixels: drawing.shapes.iter().map(pixel).collect(),
+    }
+}
+
+/// A place for a vector picture.
+#[derive(Debug)]
+pub struct VectorTarget {
+    pub place: Place,
+    pub format: VectorFormat,
+}
+
+impl VectorTarget {
+    /// Writes the drawing there.
+    pub fn write(&self, drawing: &Drawing, options: &VectorOptions) -> Result<(), Failure> {
+        let Place::File(path) = &self.place else {
+            let mut stdout = io::stdout().lock();
+            return match stream_drawing(&mut stdout, self.format, drawing, options) {
+                Ok(()) => Ok(()),
+                // Who reads has read enough.
+                Err(WriteProblem::Io(error)) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+                Err(problem) => {
+                    let message = format!("stdout: {problem}");
+                    Err(Failure::new(Code::InputOutput, message))
+                }
+            };
+        };
+        Ok(write_drawing(path, self.format, drawing, options)?)
+    }
+}

@@ -1,0 +1,236 @@
+use super::outline::{Point, Rounding};
+use super::{VectorOptions, name_of_lines, srgb8};
+use miniz_oxide::deflate::compress_to_vec_zlib;
+use pdf_writer::{Array, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
+use std::fmt::Write;
+use veduta::drawing::Drawing;
+
+/// Points (1/72 inch) of a pixel, of which CSS has 96 to an inch.
+const POINTS_PER_PIXEL: f64 = 0.75;
+
+/// How hard to compress, of 10.
+const COMPRESSION: u8 = 6;
+
+/// A PDF of one page. Groups are optional content groups, which viewers list as layers; a part of
+/// the page within the marks of its group and of all around it shows when all of them are on.
+///
+/// Colours are DeviceRGB, which viewers take for sRGB.
+pub fn encode(drawing: &Drawing, options: &VectorOptions) -> Vec<u8> {
+    let mut layers = Layers::default();
+    let content = content(drawing, options, &mut layers);
+    let compressed = compress_to_vec_zlib(content.as_bytes(), COMPRESSION);
+
+    let [catalog, pages, page, stream, document] = [1, 2, 3, 4, 5].map(Ref::new);
+    let layer_ref = |index: usize| Ref::new(6 + index as i32);
+    let mut pdf = Pdf::new();
+    pdf.set_version(1, 7);
+    {
+        let mut catalog = pdf.catalog(catalog);
+        catalog.pages(pages);
+        let mut optional = catalog.insert(Name(b"OCProperties")).dict();
+        let all = (0..layers.layers.len()).map(layer_ref);
+        optional.insert(Name(b"OCGs")).array().items(all);
+        let mut usual = optional.insert(Name(b"D")).dict();
+        layers.push_children(None, &mut usual.insert(Name(b"Order")).array(), &layer_ref);
+    }
+    pdf.pages(pages).kids([page]).count(1);
+    {
+        let mut page = pdf.page(page);
+        let [width, height] = drawing.size.map(|side| (side * POINTS_PER_PIXEL) as f32);
+        page.parent(pages);
+        page.media_box(Rect::new(0.0, 0.0, width, height));
+        page.contents(stream);
+        let mut resources = page.resources();
+        let mut properties = resources.insert(Name(b"Properties")).dict();
+        for index in 0..layers.layers.len() {
+            properties.pair(Name(resource_name(index).as_bytes()), layer_ref(index));
+        }
+    }
+    pdf.stream(stream, &compressed)
+        .filter(Filter::FlateDecode)
+        .finish();
+    {
+        let mut told = pdf.document_info(document);
+        told.producer(TextStr("Veduta"));
+        if !options.title.is_empty() {
+            told.title(TextStr(&options.title));
+        }
+    }
+    for (index, layer) in layers.layers.iter().enumerate() {
+        pdf.indirect(layer_ref(index))
+            .dict()
+            .pair(Name(b"Type"), Name(b"OCG"))
+            .pair(Name(b"Name"), TextStr(&layer.name));
+    }
+    pdf.finish()
+}
+
+/// The layers of the document, parents before children.
+#[derive(Default)]
+struct Layers {
+    layers: Vec<Layer>,
+}
+
+struct Layer {
+    name: String,
+    children: Vec<usize>,
+    is_root: bool,
+}
+
+impl Layers {
+    fn push(&mut self, name: &str, parent: Option<usize>) -> usize {
+        let index = self.layers.len();
+        if let Some(parent) = parent {
+            self.layers[parent].children.push(index);
+        }
+        self.layers.push(Layer {
+            name: name.to_owned(),
+            children: Vec::new(),
+            is_root: parent.is_none(),
+        });
+        index
+    }
+
+    /// Lists layers as they are nested: after each the array of its children, if it has any. What is
+    /// painted last comes first, as in programs for drawing.
+    fn push_children(
+        &self,
+        parent: Option<usize>,
+        order: &mut Array,
+        layer_ref: &impl Fn(usize) -> Ref,
+    ) {
+        let children: Vec<usize> = match parent {
+            Some(parent) => self.layers[parent].children.clone(),
+            None => (0..self.layers.len())
+                .filter(|&index| self.layers[index].is_root)
+                .collect(),
+        };
+        for &child in children.iter().rev() {
+            order.item(layer_ref(child));
+            if !self.layers[child].children.is_empty() {
+                self.push_children(Some(child), &mut order.push().array(), layer_ref);
+            }
+        }
+    }
+}
+
+/// By which the page's content knows a layer.
+fn resource_name(layer: usize) -> String {
+    format!("G{layer}")
+}
+
+fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> String {
+    let mut content = Content {
+        text: String::new(),
+        rounding: Rounding::new(options.decimals),
+        fill: None,
+    };
+    let height = drawing.size[1] * POINTS_PER_PIXEL;
+    // From here on in pixels, y downwards.
+    content.push(format_args!(
+        "{POINTS_PER_PIXEL} 0 0 -{POINTS_PER_PIXEL} 0 {height} cm\n"
+    ));
+    if let Some(color) = options.background {
+        content.fill(srgb8(color));
+        let [width, height] = drawing.size;
+        content.push(format_args!("0 0 {width} {height} re f\n"));
+    }
+    let mut open: Vec<u32> = Vec::new();
+    for (index, group) in (0u32..).zip(&drawing.groups) {
+        while open.last().copied() != group.parent {
+            open.pop();
+            content.text.push_str("EMC\n");
+        }
+        open.push(index);
+        // Layers and groups begin with the same rows.
+        let layer = layers.push(&group.name, group.parent.map(|parent| parent as usize));
+        content.begin_layer(layer);
+        for shape in &drawing.shapes[group.shapes.clone()] {
+            let rings = content.rounding.rings(&shape.painted);
+            if !rings.is_empty() {
+                content.fill(srgb8(shape.radiance));
+                for ring in &rings {
+                    content.path(ring);
+                    content.text.push_str("h\n");
+                }
+                content.text.push_str("f\n");
+            }
+        }
+    }
+    for _ in open {
+        content.text.push_str("EMC\n");
+    }
+    if !drawing.strokes.is_empty() {
+        content.lines(drawing, options, layers);
+    }
+    content.text
+}
+
+/// The page's content (ISO 32000-1, 8 and 14.6).
+struct Content {
+    text: String,
+    rounding: Rounding,
+    /// The colour that fills now.
+    fill: Option<[u8; 3]>,
+}
+
+impl Content {
+    fn push(&mut self, text: std::fmt::Arguments) {
+        // Writing to a string cannot fail.
+        let _ = self.text.write_fmt(text);
+    }
+
+    fn begin_layer(&mut self, layer: usize) {
+        let name = resource_name(layer);
+        self.push(format_args!("/OC /{name} BDC\n"));
+    }
+
+    fn color(&mut self, color: [u8; 3], operator: &str) {
+        // Four decimals tell each of the 256 values.
+        let [r, g, b] = color.map(|channel| f64::from(channel) / 255.0);
+        self.push(format_args!("{r:.4} {g:.4} {b:.4} {operator}\n"));
+    }
+
+    fn fill(&mut self, color: [u8; 3]) {
+        if self.fill != Some(color) {
+            self.fill = Some(color);
+            self.color(color, "rg");
+        }
+    }
+
+    fn lines(&mut self, drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) {
+        let all = layers.push("lines", None);
+        self.begin_layer(all);
+        self.color(srgb8(options.line_color), "RG");
+        let width = options.line_width;
+        // Round caps and joins.
+        self.push(format_args!("{width} w 1 J 1 j\n"));
+        for strokes in drawing.strokes.chunk_by(|a, b| a.kind == b.kind) {
+            let layer = layers.push(name_of_lines(strokes[0].kind), Some(all));
+            self.begin_layer(layer);
+            for stroke in strokes {
+                let (chain, end) = if stroke.closed {
+                    (self.rounding.ring(&stroke.points), "s\n")
+                } else {
+                    (self.rounding.chain(&stroke.points), "S\n")
+                };
+                if let Some(chain) = chain {
+                    self.path(&chain);
+                    self.text.push_str(end);
+                }
+            }
+            self.text.push_str("EMC\n");
+        }
+        self.text.push_str("EMC\n");
+    }
+
+    fn path(&mut self, points: &[Point]) {
+        for (index, point) in points.iter().enumerate() {
+            for &value in point {
+                self.rounding.push(&mut self.text, value);
+                self.text.push(' ');
+            }
+            self.text.push_str(if index == 0 { "m\n" } else { "l\n" });
+        }
+    }
+}

@@ -1,0 +1,227 @@
+use super::outline::{Point, Rounding};
+use super::{VectorOptions, name_of_lines, srgb8};
+use std::collections::HashSet;
+use std::fmt::Write;
+use veduta::drawing::Drawing;
+
+/// SVG text. Groups nest as names do; a path is a shape, in relative coordinates.
+pub fn encode(drawing: &Drawing, options: &VectorOptions) -> String {
+    let mut svg = Svg {
+        text: String::new(),
+        rounding: Rounding::new(options.decimals),
+        ids: HashSet::new(),
+    };
+    svg.document(drawing, options);
+    svg.text
+}
+
+struct Svg {
+    text: String,
+    rounding: Rounding,
+    /// Those given so far; only looked up in.
+    ids: HashSet<String>,
+}
+
+impl Svg {
+    fn document(&mut self, drawing: &Drawing, options: &VectorOptions) {
+        let [width, height] = drawing.size;
+        self.push(format_args!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {width} {height}\">\n"
+        ));
+        if !options.title.is_empty() {
+            self.title(&options.title);
+        }
+        if let Some(color) = options.background {
+            let color = Color(srgb8(color));
+            self.push(format_args!(
+                "<rect width=\"{width}\" height=\"{height}\" fill=\"{color}\"/>\n"
+            ));
+        }
+        self.groups(drawing);
+        if !drawing.strokes.is_empty() {
+            self.lines(drawing, options);
+        }
+        self.text.push_str("</svg>\n");
+    }
+
+    fn groups(&mut self, drawing: &Drawing) {
+        // Groups that are open, the outermost first.
+        let mut open: Vec<u32> = Vec::new();
+        for (index, group) in (0u32..).zip(&drawing.groups) {
+            while open.last().copied() != group.parent {
+                open.pop();
+                self.text.push_str("</g>\n");
+            }
+            open.push(index);
+            self.begin_group(&group.name);
+            for shape in &drawing.shapes[group.shapes.clone()] {
+                let rings = self.rounding.rings(&shape.painted);
+                if !rings.is_empty() {
+                    let color = Color(srgb8(shape.radiance));
+                    self.push(format_args!("<path fill=\"{color}\" d=\""));
+                    self.path(&rings, true);
+                    self.text.push_str("\"/>\n");
+                }
+            }
+        }
+        for _ in open {
+            self.text.push_str("</g>\n");
+        }
+    }
+
+    fn lines(&mut self, drawing: &Drawing, options: &VectorOptions) {
+        let id = self.id("lines");
+        let (color, width) = (Color(srgb8(options.line_color)), options.line_width);
+        self.push(format_args!(
+            "<g id=\"{id}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" \
+             stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
+        ));
+        for strokes in drawing.strokes.chunk_by(|a, b| a.kind == b.kind) {
+            self.begin_group(name_of_lines(strokes[0].kind));
+            for stroke in strokes {
+                let chain = if stroke.closed {
+                    self.rounding.ring(&stroke.points)
+                } else {
+                    self.rounding.chain(&stroke.points)
+                };
+                if let Some(chain) = chain {
+                    self.text.push_str("<path d=\"");
+                    self.path(&[chain], stroke.closed);
+                    self.text.push_str("\"/>\n");
+                }
+            }
+            self.text.push_str("</g>\n");
+        }
+        self.text.push_str("</g>\n");
+    }
+
+    fn begin_group(&mut self, name: &str) {
+        let id = self.id(name);
+        self.push(format_args!("<g id=\"{id}\">"));
+        self.title(name);
+    }
+
+    fn title(&mut self, title: &str) {
+        self.text.push_str("<title>");
+        push_escaped(&mut self.text, title);
+        self.text.push_str("</title>\n");
+    }
+
+    fn push(&mut self, text: std::fmt::Arguments) {
+        // Writing to a string cannot fail.
+        let _ = self.text.write_fmt(text);
+    }
+
+    /// A name made an id that nothing else has: what cannot stand in one becomes `_`.
+    fn id(&mut self, name: &str) -> String {
+        let is_start = |c: char| c.is_ascii_alphabetic() || c == '_' || is_letter_beyond_ascii(c);
+        let mut id = String::new();
+        for c in name.chars() {
+            let fits = is_start(c) || c.is_ascii_digit() || c == '-' || c == '.';
+            if id.is_empty() && !is_start(c) {
+                id.push('_');
+            }
+            if fits {
+                id.push(c);
+            } else if !id.ends_with('_') {
+                id.push('_');
+            }
+        }
+        if id.is_empty() {
+            id.push('_');
+        }
+        let mut unique = id.clone();
+        let mut count = 1;
+        while !self.ids.insert(unique.clone()) {
+            count += 1;
+            unique = format!("{id}-{count}");
+        }
+        unique
+    }
+
+    /// The data of a path: relative commands, with no more separators than needed.
+    fn path(&mut self, rings: &[Vec<Point>], closed: bool) {
+        // `m` is relative to where the ring before began, since `z` goes back there.
+        let mut start = [0, 0];
+        for ring in rings {
+            self.text.push('m');
+            self.numbers(&[ring[0][0] - start[0], ring[0][1] - start[1]], true);
+            start = ring[0];
+            let mut at = start;
+            // Pairs after `m` and `l` go on as lines.
+            let mut is_line = true;
+            for &point in &ring[1..] {
+                let step = [point[0] - at[0], point[1] - at[1]];
+                at = point;
+                match step {
+                    [along, 0] => {
+                        self.text.push('h');
+                        self.numbers(&[along], true);
+                        is_line = false;
+                    }
+                    [0, along] => {
+                        self.text.push('v');
+                        self.numbers(&[along], true);
+                        is_line = false;
+                    }
+                    _ => {
+                        if !is_line {
+                            self.text.push('l');
+                        }
+                        self.numbers(&step, !is_line);
+                        is_line = true;
+                    }
+                }
+            }
+            if closed {
+                self.text.push('z');
+            }
+        }
+    }
+
+    /// Appends numbers; `after_letter` says that nothing needs to part the first from what is there.
+    fn numbers(&mut self, values: &[i64], after_letter: bool) {
+        for (index, &value) in values.iter().enumerate() {
+            if value >= 0 && (index > 0 || !after_letter) {
+                self.text.push(' ');
+            }
+            self.rounding.push(&mut self.text, value);
+        }
+    }
+}
+
+/// Letters that XML names may have, of those beyond ASCII: what Unicode calls letters within the ranges
+/// of XML 1.0, fifth edition.
+fn is_letter_beyond_ascii(c: char) -> bool {
+    matches!(c, '\u{c0}'..='\u{2ff}' | '\u{370}'..='\u{1fff}' | '\u{3001}'..='\u{d7ff}')
+        && c.is_alphabetic()
+}
+
+/// Text of XML 1.0. What it cannot hold (control characters) becomes the replacement character.
+fn push_escaped(text: &mut String, name: &str) {
+    for c in name.chars() {
+        match c {
+            '&' => text.push_str("&amp;"),
+            '<' => text.push_str("&lt;"),
+            '>' => text.push_str("&gt;"),
+            '\t' | '\n' | '\r' => text.push(' '),
+            '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => text.push('\u{fffd}'),
+            c => text.push(c),
+        }
+    }
+}
+
+/// An 8-bit sRGB colour, in three digits if they say it.
+struct Color([u8; 3]);
+
+impl std::fmt::Display for Color {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [r, g, b] = self.0;
+        if self.0.iter().all(|channel| channel % 17 == 0) {
+            write!(f, "#{:x}{:x}{:x}", r / 17, g / 17, b / 17)
+        } else {
+            write!(f, "#{r:02x}{g:02x}{b:02x}")
+        }
+    }
+}
