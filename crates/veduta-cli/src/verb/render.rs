@@ -282,9 +282,12 @@ impl Render {
 
     /// Makes a vector picture.
     fn draw(&self, target: &VectorTarget, json: bool, talk: &mut Talk) -> Result<(), Failure> {
-        if self.sampling != Sampling::Exact || self.deep {
-            let message =
-                "a vector picture is made of exact regions; leave --sampling and --deep out";
+        if self.deep {
+            let message = "a deep picture is stored as .exr; leave --deep out";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        if self.sampling != Sampling::Exact {
+            let message = "a vector picture is made of exact regions; leave --sampling out";
             return Err(Failure::new(Code::Usage, message));
         }
         let settings = self.vector.drawing(target.format)?;
