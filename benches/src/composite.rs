@@ -21,11 +21,11 @@ pub struct StoredTimes {
     pub find: f64,
     /// Compositing the maps of two halves of the faces.
     pub two: f64,
-    /// Compositing eight maps at once, and one after the other.
+    /// Compositing eight maps at once.
     pub eight: f64,
-    /// Eight maps, each added to what there was.
+    /// Compositing eight maps, each with what there was before.
     pub chain: f64,
-    /// Writing the map into memory, and reading it.
+    /// Writing the map of all faces into memory.
     pub write: f64,
     /// Reading it.
     pub read: f64,
