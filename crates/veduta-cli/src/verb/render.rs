@@ -28,7 +28,7 @@ use veduta_io::{Layers, Loaded, scaled, source_of, write_map};
 /// those for further work (.exr, .pfm, .npy, .tif of floats) are linear and left as they are.
 ///
 /// Vector pictures (.svg, .pdf, .geojson) have one shape for neighbouring faces in one plane that look
-/// alike, named as their objects are, without seams. A shape has one colour: the mean, where it has a
+/// alike, named as their objects are, with --trap against seams between them. A shape has one colour: the mean, where it has a
 /// texture, smooth normals or colours at its corners. Lines are visible edges; hidden ones are not drawn.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]

@@ -20,6 +20,10 @@
 //! were painted last: however thin a shape is, it would be seen, since the edges of what lies on top of
 //! it let a quarter of it through.
 //!
+//! What is left: pixels in which three shapes meet may still let some of the background through (a few
+//! dozen in half a million of a city's picture), and a shape thinner than a pixel shows more of its colour
+//! between two others than its area would.
+//!
 //! Beyond a sharp point of the shape, where zones at either side would leave a wedge open, lies one more.
 //!
 //! An exit is a side beyond which there is nothing, or a shape painted earlier: where the trap would peep
