@@ -53,13 +53,13 @@ pub struct Composite {
 
 const EXAMPLES: &str = "\
 Examples:
-  A pavilion into a town, both seen by one camera:
-      veduta render town.obj --eye 40,-60,25 -o town.veduta
-      veduta render pavilion.obj --eye 40,-60,25 --look-at 0,0,4 -o pavilion.veduta
-      veduta composite town.veduta pavilion.veduta -o both.veduta
-      veduta composite town.veduta pavilion.veduta -o both.png
-  The pavilion alone, with holes where the town stands before it:
-      veduta composite pavilion.veduta --holdout town.veduta -o element.exr
+  A hut into a town, both seen by one camera:
+      veduta render town.obj --eye 9,-9,5 --look-at 0,0,0 -o seen.veduta
+      veduta render hut.obj --eye 9,-9,5 --look-at 0,0,0 -o hut.veduta
+      veduta composite seen.veduta hut.veduta -o both.veduta
+      veduta composite seen.veduta hut.veduta -o both.png
+  The hut alone, with holes where the town stands before it:
+      veduta composite hut.veduta --holdout seen.veduta -o element.exr
 ";
 
 impl Composite {

@@ -51,13 +51,13 @@ pub struct Shade {
 const EXAMPLES: &str = "\
 Examples:
   Keep what is seen, then make pictures of it:
-      veduta render town.obj -o town.veduta
+      veduta render town.obj -o town.veduta --force
       veduta shade town.veduta -o town.png
       veduta shade town.veduta --scale 4 -o large.png
   A part of it, as through a magnifying glass:
-      veduta shade town.veduta --scale 16 --window 9000,8000,640,480 -o detail.png
-  With other roofs:
-      veduta shade town.veduta --set 'material.\"roof\".color=#446' -o slate.png
+      veduta shade town.veduta --scale 9 --window 3000,2000,320,240 -o part.png
+  With what was red in another colour:
+      veduta shade town.veduta --set 'material.\"red\".color=#446' -o slate.png
 ";
 
 impl Shade {

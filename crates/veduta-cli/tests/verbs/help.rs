@@ -32,6 +32,8 @@ fn every_example_of_every_help_text_works() {
     let folder = Folder::new();
     folder.told("render town.obj --size 64x48 --background #8ab4d8 -o sky.jpg");
     folder.told("render town.obj --size 64x48 --unlit -o flat.png");
+    // Nearer, so that another near plane suits it.
+    folder.write("hut.obj", "o hut\nv 0 0 2\nv 1 0 2\nv 0 1 2\nf 1 2 3\n");
     folder.told("render town.obj --size 64x48 --unlit --depth 16 -o deep.png");
     // The program by its name.
     let path = std::env::var_os("PATH").unwrap_or_default();

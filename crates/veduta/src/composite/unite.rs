@@ -75,7 +75,12 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
             }
         })
         .collect();
-    let camera = first.map.camera;
+    // What was clipped before a near plane is not known; it does not change what lies behind.
+    let nears = maps.iter().map(|seen| seen.map.camera.near);
+    let camera = Camera {
+        near: nears.fold(f64::INFINITY, f64::min),
+        ..first.map.camera
+    };
     let mut is_shown = vec![false; faces.len()];
     for face in new_ids[..shown].iter().flatten() {
         is_shown[face.index()] = true;
@@ -92,9 +97,10 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
     Ok(SeenScene::of(&united.scene, &map, first.size))
 }
 
-/// In what two cameras differ; in words for the user.
+/// In what two cameras differ, in words for the user. Near planes may: nearness does not depend on them.
 fn camera_difference(one: &Camera, other: &Camera) -> Option<String> {
-    if one == other {
+    let near = one.near;
+    if *one == (Camera { near, ..*other }) {
         return None;
     }
     let place = |camera: &Camera| camera.eye_from_world.inverse().w_axis.truncate();
@@ -139,10 +145,7 @@ fn camera_difference(one: &Camera, other: &Camera) -> Option<String> {
         let (a, b) = (one.aspect(), other.aspect());
         return words("width over height of its frame are", &a, &b);
     }
-    if one.shift != other.shift {
-        return words("its lens is shifted by", &one.shift, &other.shift);
-    }
-    words("its near plane is at", &one.near, &other.near)
+    words("its lens is shifted by", &one.shift, &other.shift)
 }
 
 fn world_difference(one: &World, other: &World) -> Option<String> {
