@@ -8,6 +8,7 @@
 //! or shape; pixels come later, as an affine map of the image plane. So a map has no resolution.
 
 mod camera;
+mod casters;
 mod faces;
 pub mod file;
 mod fragments;
@@ -18,6 +19,7 @@ pub mod scene;
 mod stored;
 
 pub use camera::{Camera, Projection};
+pub use casters::{Casters, Choice, Origin, Reading, Source};
 pub use faces::Faces;
 pub use fragments::{Fragment, Fragments, Seen, Side};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};

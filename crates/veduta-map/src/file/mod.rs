@@ -3,6 +3,7 @@
 //! A file is a ZIP archive whose members are stored as they are: Arrow IPC files, each a table, and
 //! `manifest.json`, written last. docs/format.md tells the columns and how to read them from Python.
 //!
+//! - `casters` keeps, where that is asked for, what the map does not show but what casts shadows.
 //! - `tables` are the columns; `tiles` says which rows stand together, so that a window of the picture
 //!   reads little; `container` is the archive, `manifest` what else there is to know.
 //! - Every byte is under a checksum, or is compared with its only legal value, before it is decoded:
@@ -12,14 +13,16 @@
 //! Writing goes through the tables one after the other, reading through the tiles, so that neither
 //! holds more than the map itself and a tile of the file.
 
+mod casters;
 mod container;
 mod manifest;
+mod message;
 mod read;
 mod tables;
 mod tiles;
 mod write;
 
-pub use manifest::{Source, VERSION};
+pub use manifest::VERSION;
 pub use read::MapReader;
 pub use write::write_map;
 

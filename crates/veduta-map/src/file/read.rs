@@ -1,16 +1,19 @@
 //! A file -> a seen scene, whole or a window of it.
 
 use super::FileError;
+use super::casters;
 use super::container::{ArchiveReader, Member};
-use super::manifest::{MANIFEST, Manifest, Segment, Source, Table};
+use super::manifest::{MANIFEST, Manifest, Segment, Table};
+use super::message;
 use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
 use crate::scene::{Mesh, MeshId, Object, Scene};
 use crate::{
-    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, SeenScene, Side, VisibilityMap,
+    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, Reading, SeenScene, Side,
+    Source, VisibilityMap,
 };
 use arrow_array::RecordBatch;
+use arrow_ipc::MetadataVersion;
 use arrow_ipc::reader::FileDecoder;
-use arrow_ipc::{Block, MetadataVersion};
 use arrow_schema::SchemaRef;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
@@ -60,14 +63,13 @@ impl<R: Read + Seek> MapReader<R> {
                 return unsound(format!("the parts of {} are not all of it", member.name));
             }
         }
-        for table in TableName::ALL {
-            let name = table.member();
+        for name in self.known_tables() {
             let (Some(_), Some(found)) =
                 (self.archive.member(name), self.manifest.tables.get(name))
             else {
                 return unsound(format!("{name} is missing"));
             };
-            let of_tiles = TableName::OF_TILES.contains(&table);
+            let of_tiles = TableName::OF_TILES.map(TableName::member).contains(&name);
             if of_tiles && found.batches.len() != self.manifest.tiles.len() {
                 return unsound(format!("{name} does not have a batch for each tile"));
             }
@@ -76,6 +78,20 @@ impl<R: Read + Seek> MapReader<R> {
             return unsound("the picture has no pixels".into());
         }
         Ok(())
+    }
+
+    /// The members whose tables this program knows of, all of which must be there.
+    fn known_tables(&self) -> Vec<&'static str> {
+        let mut names = TableName::ALL.map(TableName::member).to_vec();
+        if self.has_embedded_casters() {
+            names.extend(casters::members());
+        }
+        names
+    }
+
+    /// What is in the file and where.
+    pub(super) fn manifest(&self) -> &Manifest {
+        &self.manifest
     }
 
     /// Pixels of the picture that the map was made for.
@@ -96,6 +112,23 @@ impl<R: Read + Seek> MapReader<R> {
     /// The files that the scene was read from.
     pub fn sources(&self) -> &[Source] {
         &self.manifest.sources
+    }
+
+    /// Whether the file tells what casts, itself or by naming files.
+    pub fn tells_casters(&self) -> bool {
+        self.manifest.casters.is_some()
+    }
+
+    /// Whether casters are kept in the file itself.
+    pub fn has_embedded_casters(&self) -> bool {
+        let casters = self.manifest.casters.as_ref();
+        casters.is_some_and(|casters| casters.embedded.is_some())
+    }
+
+    /// How casters are read again that the file does not hold itself.
+    pub fn readings(&self) -> &[Reading] {
+        let casters = self.manifest.casters.as_ref();
+        casters.map_or(&[], |casters| &casters.readings)
     }
 
     /// Bytes read so far.
@@ -136,11 +169,12 @@ impl<R: Read + Seek> MapReader<R> {
         for member in self.archive.members().to_vec() {
             self.archive.check(&member)?;
         }
-        for table in TableName::ALL {
-            let (_, member, found) = self.table(table)?;
+        for table in self.known_tables() {
+            let (member, found) = self.table(table)?;
             let (start, head) = (member.start(), found.head.clone());
             self.segment(table, start, &head)?;
         }
+        self.read_casters()?;
         let seen = self.read()?;
         let sound = seen.map.check();
         sound.map_err(|invariant| FileError::unsound("the map", invariant.to_string()))?;
@@ -151,7 +185,7 @@ impl<R: Read + Seek> MapReader<R> {
         let mut rows = SeenRows::default();
         let mut of_tiles = Vec::new();
         for table in TableName::OF_TILES {
-            of_tiles.push(TableReader::new(self, table)?);
+            of_tiles.push(TableReader::new(self, table.member())?);
         }
         for tile in tiles {
             let mut batches = Vec::with_capacity(of_tiles.len());
@@ -177,11 +211,11 @@ impl<R: Read + Seek> MapReader<R> {
             world: self.manifest.world.clone(),
             ..Scene::default()
         };
-        self.read_all(TableName::Images, |batch| {
+        self.read_all(TableName::Images.member(), |batch| {
             scene.images.push(batch.image()?);
             Ok(())
         })?;
-        self.read_all(TableName::Objects, |batch| {
+        self.read_all(TableName::Objects.member(), |batch| {
             for (name, world_from_object) in batch.objects()? {
                 let mesh = MeshId(scene.objects.len() as u32);
                 scene.objects.push(Object {
@@ -196,16 +230,17 @@ impl<R: Read + Seek> MapReader<R> {
         rows.into_seen(scene, &self.manifest)
     }
 
-    fn read_all(
+    /// Reads a table, batch by batch.
+    pub(super) fn read_all(
         &mut self,
-        table: TableName,
+        member: &'static str,
         mut take: impl FnMut(Rows) -> Result<(), FileError>,
     ) -> Result<(), FileError> {
-        let reader = TableReader::new(self, table)?;
+        let reader = TableReader::new(self, member)?;
         for index in 0..reader.starts.len() {
             take(Rows {
                 batch: &reader.batch(self, index)?,
-                member: table.member(),
+                member,
                 index,
             })?;
         }
@@ -213,28 +248,27 @@ impl<R: Read + Seek> MapReader<R> {
     }
 
     /// A table's member and where its batches lie. That it is there was checked.
-    fn table(&self, name: TableName) -> Result<(TableName, &Member, &Table), FileError> {
-        let member = self.archive.member(name.member());
-        let table = self.manifest.tables.get(name.member());
-        let both = member.zip(table);
-        let (member, table) =
-            both.ok_or_else(|| FileError::unsound(name.member(), "is missing"))?;
-        Ok((name, member, table))
+    fn table(&self, name: &'static str) -> Result<(&Member, &Table), FileError> {
+        let both = self
+            .archive
+            .member(name)
+            .zip(self.manifest.tables.get(name));
+        both.ok_or_else(|| FileError::unsound(name, "is missing"))
     }
 
     /// The bytes of a part of a table, which are those that were written.
     fn segment(
         &mut self,
-        table: TableName,
+        table: &'static str,
         start: u64,
         segment: &Segment,
     ) -> Result<Vec<u8>, FileError> {
-        let bytes = self.archive.bytes(table.member(), start, segment.length)?;
+        let bytes = self.archive.bytes(table, start, segment.length)?;
         if Segment::of(&bytes) == *segment {
             Ok(bytes)
         } else {
             Err(FileError::Damaged {
-                what: table.member().into(),
+                what: table.into(),
                 offset: start,
             })
         }
@@ -252,22 +286,23 @@ impl Table {
 
 /// A table whose tail was read, in which its schema stands.
 struct TableReader {
-    name: TableName,
+    name: &'static str,
     decoder: FileDecoder,
     /// Where each batch begins, and what its bytes are.
     starts: Vec<(u64, Segment)>,
 }
 
-/// Bytes that head a message of Arrow.
-const MESSAGE_PREFIX: usize = 8;
-
 impl TableReader {
-    fn new<R: Read + Seek>(reader: &mut MapReader<R>, name: TableName) -> Result<Self, FileError> {
-        let (_, member, table) = reader.table(name)?;
+    fn new<R: Read + Seek>(
+        reader: &mut MapReader<R>,
+        name: &'static str,
+    ) -> Result<Self, FileError> {
+        let (member, table) = reader.table(name)?;
         let (start, end, table) = (member.start(), member.end(), table.clone());
         let tail = reader.segment(name, end - table.tail.length, &table.tail)?;
         let schema = schema_of(&tail)
-            .ok_or_else(|| FileError::unsound(name.member(), "does not end with a schema"))?;
+            .ok_or_else(|| FileError::unsound(name, "does not end with a schema"))?;
+        message::check_schema(&schema).map_err(|what| FileError::unsound(name, what))?;
         let mut next = start + table.head.length;
         let starts = table.batches.into_iter().map(|segment| {
             let start = next;
@@ -288,18 +323,14 @@ impl TableReader {
     ) -> Result<RecordBatch, FileError> {
         let (start, segment) = &self.starts[index];
         let bytes = reader.segment(self.name, *start, segment)?;
-        let no_batch = || FileError::unsound(self.name.member(), format!("batch {index} is none"));
-        let metadata = bytes.get(4..8).and_then(|length| length.try_into().ok());
-        let metadata = metadata.map(i32::from_le_bytes).ok_or_else(no_batch)?;
-        let metadata = usize::try_from(metadata).map_err(|_| no_batch())? + MESSAGE_PREFIX;
-        if metadata > bytes.len() {
-            return Err(no_batch());
-        }
-        let block = Block::new(0, metadata as i32, (bytes.len() - metadata) as i64);
+        let no_batch = |why: &str| {
+            let what = format!("batch {index} cannot be read: {why}");
+            FileError::unsound(self.name, what)
+        };
+        let block = message::check_batch(&bytes).map_err(no_batch)?;
         let batch = self.decoder.read_record_batch(&block, &bytes.into());
-        let batch =
-            batch.map_err(|error| FileError::unsound(self.name.member(), error.to_string()))?;
-        batch.ok_or_else(no_batch)
+        let batch = batch.map_err(|error| no_batch(&error.to_string()))?;
+        batch.ok_or_else(|| no_batch("it is none"))
     }
 }
 
@@ -315,7 +346,7 @@ fn schema_of(tail: &[u8]) -> Option<SchemaRef> {
 }
 
 /// What the manifest and the small tables name must be there.
-fn check_scene(scene: &Scene) -> Result<(), FileError> {
+pub(super) fn check_scene(scene: &Scene) -> Result<(), FileError> {
     let unsound = |what: String| Err(FileError::unsound(MANIFEST, what));
     let objects = scene.objects.len() as u32;
     for layer in &scene.layers {
@@ -379,7 +410,7 @@ impl SeenRows {
         scene.meshes = vec![Mesh::default(); scene.objects.len()];
         for row in &self.vertices {
             let mesh = scene.meshes.get_mut(row.object as usize);
-            if !mesh.is_some_and(|mesh| row.push_to(mesh)) {
+            if !mesh.is_some_and(|mesh| row.at.push_to(mesh)) {
                 let what = format!(
                     "vertex {} of object {} does not fit",
                     row.vertex, row.object

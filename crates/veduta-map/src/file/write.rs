@@ -1,41 +1,38 @@
 //! A seen scene -> a file.
 
 use super::FileError;
+use super::casters::write_casters;
 use super::container::ArchiveWriter;
-use super::manifest::{FORMAT, MANIFEST, Manifest, Segment, Source, Table, VERSION};
+use super::manifest::{FORMAT, MANIFEST, Manifest, Segment, Table, VERSION};
 use super::tables::{TableName, TileBatches, image_row, object_rows};
 use super::tiles::tiles;
-use crate::SeenScene;
+use crate::{Origin, SeenScene};
 use arrow_array::RecordBatch;
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
+use arrow_schema::Schema;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 /// Objects of a batch.
 const OBJECTS_PER_BATCH: usize = 4096;
 
-/// Writes `seen` to `out`, from its byte 0 on. `sources` are the files that its scene was read from.
+/// Writes `seen` to `out`, from its byte 0 on, and what `origin` tells of it.
 ///
 /// # Errors
 /// Those of `out`.
 ///
 /// # Panics
-/// If `seen` is not in normal form.
+/// If `seen` is not in normal form, or a mesh that casts is unsound.
 pub fn write_map<W: Write + Seek>(
     out: W,
     seen: &SeenScene,
-    sources: &[Source],
+    origin: &Origin,
 ) -> Result<W, FileError> {
     let (map, scene) = (&seen.map, &seen.scene);
-    let mut archive = ArchiveWriter::new(out);
-    let mut tables = BTreeMap::new();
+    let mut writer = TableWriter::new(out);
     let mut write = |table: TableName, batches: &mut dyn Iterator<Item = RecordBatch>| {
-        tables.insert(
-            table.member().to_owned(),
-            write_table(&mut archive, table, batches)?,
-        );
-        Ok::<(), FileError>(())
+        writer.write(table.member(), &table.schema(), batches)
     };
     let tiles = tiles(map);
     for table in TableName::OF_TILES {
@@ -48,8 +45,11 @@ pub fn write_map<W: Write + Seek>(
     let objects = scene.objects.chunks(OBJECTS_PER_BATCH);
     write(TableName::Objects, &mut objects.map(object_rows))?;
     write(TableName::Images, &mut scene.images.iter().map(image_row))?;
-
-    let manifest = Manifest {
+    let casters = match &origin.casters {
+        Some(casters) => Some(write_casters(&mut writer, casters, &scene.images)?),
+        None => None,
+    };
+    writer.finish(|tables| Manifest {
         format: FORMAT.into(),
         version: VERSION,
         generator: concat!("veduta ", env!("CARGO_PKG_VERSION")).into(),
@@ -59,46 +59,74 @@ pub fn write_map<W: Write + Seek>(
         layers: scene.layers.clone(),
         lights: scene.lights.clone(),
         materials: scene.materials.clone(),
-        sources: sources.to_vec(),
+        sources: origin.sources.clone(),
+        casters,
         tiles: tiles.iter().map(|tile| tile.bounds).collect(),
         tables,
-    };
-    let io = FileError::io(MANIFEST);
-    archive.begin(MANIFEST).map_err(&io)?;
-    serde_json::to_writer(&mut archive, &manifest).map_err(|error| io(error.into()))?;
-    archive.end().map_err(&io)?;
-    archive.finish().map_err(&io)
+    })
 }
 
-/// Writes a table as a member, batch by batch.
-fn write_table<W: Write + Seek>(
-    archive: &mut ArchiveWriter<W>,
-    table: TableName,
-    batches: &mut dyn Iterator<Item = RecordBatch>,
-) -> Result<Table, FileError> {
-    let io = FileError::io(table.member());
-    let options = IpcWriteOptions::default().try_with_compression(Some(CompressionType::ZSTD))?;
-    archive.begin(table.member()).map_err(&io)?;
-    // Arrow's writer fills a buffer that is emptied after each batch.
-    let mut writer = FileWriter::try_new_with_options(Vec::new(), &table.schema(), options)?;
-    let mut empty = |buffer: &mut Vec<u8>| -> Result<Segment, FileError> {
-        archive.write_all(buffer).map_err(&io)?;
-        let segment = Segment::of(buffer);
-        buffer.clear();
-        Ok(segment)
-    };
-    let head = empty(writer.get_mut())?;
-    let mut segments = Vec::new();
-    for batch in batches {
-        writer.write(&batch)?;
-        segments.push(empty(writer.get_mut())?);
+/// Writes tables as members of an archive, one after the other, and the manifest last.
+pub struct TableWriter<W> {
+    archive: ArchiveWriter<W>,
+    tables: BTreeMap<String, Table>,
+}
+
+impl<W: Write + Seek> TableWriter<W> {
+    fn new(out: W) -> Self {
+        Self {
+            archive: ArchiveWriter::new(out),
+            tables: BTreeMap::new(),
+        }
     }
-    writer.finish()?;
-    let tail = empty(writer.get_mut())?;
-    archive.end().map_err(&io)?;
-    Ok(Table {
-        head,
-        batches: segments,
-        tail,
-    })
+
+    /// Writes a table as a member, batch by batch.
+    pub fn write(
+        &mut self,
+        member: &'static str,
+        schema: &Schema,
+        batches: &mut dyn Iterator<Item = RecordBatch>,
+    ) -> Result<(), FileError> {
+        let io = FileError::io(member);
+        let options =
+            IpcWriteOptions::default().try_with_compression(Some(CompressionType::ZSTD))?;
+        self.archive.begin(member).map_err(&io)?;
+        // Arrow's writer fills a buffer that is emptied after each batch.
+        let mut writer = FileWriter::try_new_with_options(Vec::new(), schema, options)?;
+        let mut empty = |buffer: &mut Vec<u8>| -> Result<Segment, FileError> {
+            self.archive.write_all(buffer).map_err(&io)?;
+            let segment = Segment::of(buffer);
+            buffer.clear();
+            Ok(segment)
+        };
+        let head = empty(writer.get_mut())?;
+        let mut segments = Vec::new();
+        for batch in batches {
+            writer.write(&batch)?;
+            segments.push(empty(writer.get_mut())?);
+        }
+        writer.finish()?;
+        let tail = empty(writer.get_mut())?;
+        self.archive.end().map_err(&io)?;
+        let table = Table {
+            head,
+            batches: segments,
+            tail,
+        };
+        self.tables.insert(member.to_owned(), table);
+        Ok(())
+    }
+
+    /// Writes the manifest that is made of what is told of the tables.
+    fn finish(
+        mut self,
+        manifest: impl FnOnce(BTreeMap<String, Table>) -> Manifest,
+    ) -> Result<W, FileError> {
+        let io = FileError::io(MANIFEST);
+        self.archive.begin(MANIFEST).map_err(&io)?;
+        let manifest = manifest(self.tables);
+        serde_json::to_writer(&mut self.archive, &manifest).map_err(|error| io(error.into()))?;
+        self.archive.end().map_err(&io)?;
+        self.archive.finish().map_err(&io)
+    }
 }
