@@ -6,8 +6,8 @@ use std::hint::black_box;
 use std::io::Cursor;
 use veduta::composite::composite;
 use veduta::geometry::DVec2;
-use veduta::map::SeenScene;
 use veduta::map::file::{MapReader, write_map};
+use veduta::map::{Origin, SeenScene};
 use veduta::pipeline::find_visibility;
 use veduta::scene::{MeshId, Scene};
 
@@ -81,7 +81,7 @@ pub fn stored_times(case: &Case) -> StoredTimes {
 }
 
 fn written(seen: &SeenScene) -> Vec<u8> {
-    let out = write_map(Cursor::new(Vec::new()), seen, &[]);
+    let out = write_map(Cursor::new(Vec::new()), seen, &Origin::default());
     out.expect("memory takes all").into_inner()
 }
 

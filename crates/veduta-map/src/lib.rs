@@ -16,6 +16,7 @@ mod ids;
 mod line;
 mod map;
 pub mod scene;
+mod spans;
 mod stored;
 
 pub use camera::{Camera, Projection};
@@ -25,5 +26,6 @@ pub use fragments::{Fragment, Fragments, Seen, Side};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
 pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};
+pub use spans::{SeenSpans, Span, SpanBand, Spans, TooFewSubScanlines};
 pub use stored::SeenScene;
 pub use veduta_geometry::Affine;

@@ -16,6 +16,7 @@ pub mod drawing;
 pub mod pipeline;
 pub mod scene;
 pub mod shade;
+mod sweep;
 pub mod visibility;
 
 pub use veduta_geometry as geometry;

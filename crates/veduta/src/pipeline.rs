@@ -4,7 +4,7 @@
 mod aovs;
 mod deep;
 
-pub use deep::render_deep;
+pub use deep::{deep_window, render_deep};
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};
@@ -12,13 +12,15 @@ use crate::drawing::{self, Drawing, Evenness, Look};
 use crate::scene::{AlphaMode, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
-use crate::visibility::multiscan::{self, Spans};
+use crate::visibility::multiscan;
 use crate::visibility::{self, Seen, Strips, speculative};
 use aovs::{AovBuffers, AovMaker};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
-use veduta_map::{Camera, FaceId, Faces, MaterialId, VisibilityMap};
+use veduta_map::{
+    Camera, FaceId, Faces, MaterialId, SeenSpans, Spans, TooFewSubScanlines, VisibilityMap,
+};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,7 +143,13 @@ pub fn render(
         begin(Step::FindingVisibility);
         let spans = multiscan::find_spans(&faces, grid.width, grid.height, n);
         begin(Step::Shading);
-        return render_spans(scene, camera, &faces, &spans, settings);
+        let (unlit, aovs) = (settings.unlit, settings.aovs);
+        let (picture, aovs) = paint_spans(scene, camera, &faces, &spans, &grid, unlit, aovs);
+        return Rendered {
+            picture,
+            aovs,
+            shortcomings: shortcomings_of_spans(scene, &faces, &spans),
+        };
     }
     if faces.len() > grid.pixel_count() {
         let strips = faces.len().div_ceil(FACES_PER_STRIP);
@@ -369,23 +377,61 @@ fn add(sum: &mut [f64; 4], other: [f64; 4]) {
     }
 }
 
-/// Makes a picture of what multiscan found.
-fn render_spans(
+/// Finds what `camera` sees of `scene` along `n` sub-scanlines of each row of a picture of `width` x
+/// `height` pixels.
+///
+/// # Panics
+/// As [`multiscan::find_spans`].
+pub fn find_spans(scene: &Scene, camera: &Camera, [width, height]: [u32; 2], n: u32) -> SeenSpans {
+    let faces = visibility::project(scene, camera);
+    let spans = multiscan::find_spans(&faces, width, height, n);
+    SeenSpans::of(scene, camera, faces, &spans)
+}
+
+/// Makes the picture of what multiscan found on any grid of pixels, with channels beside the light.
+///
+/// # Errors
+/// [`TooFewSubScanlines`] where the picture is enlarged too much.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory.
+pub fn render_spans(
+    seen: &SeenSpans,
+    grid: &PixelGrid,
+    unlit: bool,
+    aovs: AovSettings,
+) -> Result<(Picture, Aovs), TooFewSubScanlines> {
+    let (frame, size) = (grid.pixels_per_frame, [grid.width, grid.height]);
+    let spans = seen.spans.on_grid(frame, grid.origin, size)?;
+    let (scene, camera, faces) = (&seen.scene, &seen.camera, &seen.faces);
+    Ok(paint_spans(scene, camera, faces, &spans, grid, unlit, aovs))
+}
+
+/// What [`render_spans`] does not show as it should, in ascending order.
+pub fn shortcomings_of_spans(scene: &Scene, faces: &Faces, spans: &Spans) -> Vec<Shortcoming> {
+    let shown = spans.faces().into_iter();
+    let materials = shown.map(|face| material_of(scene, faces, face));
+    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
+    shortcomings_of(scene, materials.collect(), veils)
+}
+
+/// Makes a picture of spans that lie on the rows of `grid`.
+fn paint_spans(
     scene: &Scene,
     camera: &Camera,
     faces: &Faces,
     spans: &Spans,
-    settings: &RenderSettings,
-) -> Rendered {
+    grid: &PixelGrid,
+    unlit: bool,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
     let shown = spans.faces();
     let materials = shown.iter().map(|&face| material_of(scene, faces, face));
-    let materials: BTreeSet<MaterialId> = materials.collect();
-    let textures = Textures::new(scene, &materials);
-    let (light, unlit) = (Daylight::default(), settings.unlit);
+    let textures = Textures::new(scene, &materials.collect());
+    let light = Daylight::default();
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
-    let grid = PixelGrid::of_frame(spans.width(), spans.height());
-    let mut canvas = Canvas::new(&grid, settings.aovs);
+    let mut canvas = Canvas::new(grid, aovs);
     let maker = canvas.maker(scene, &textures, camera, faces, &shown);
     let dice = |band: usize, buffers: &mut BandBuffers| {
         let first = band as u32 * BAND_ROWS;
@@ -393,13 +439,8 @@ fn render_spans(
         let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
         dice::dice_spans(spans, rows, fragment_of, dicer, parts);
     };
-    canvas.paint(&surfaces, maker.as_ref(), &grid, 0, dice);
-    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
-    Rendered {
-        picture: canvas.picture,
-        aovs: canvas.aovs,
-        shortcomings: shortcomings_of(scene, materials, veils),
-    }
+    canvas.paint(&surfaces, maker.as_ref(), grid, 0, dice);
+    (canvas.picture, canvas.aovs)
 }
 
 /// Faces of a strip, about, where there are more faces than pixels: enough to keep all cores at
@@ -967,6 +1008,53 @@ mod tests {
             assert!(error < 1.0 / n as f32, "{error} with {n} sub-scanlines");
             assert!(error > 0.0, "multiscan is not exact");
         }
+    }
+
+    #[test]
+    fn scaled_spans_are_off_by_more_the_fewer_sub_scanlines_are_left() {
+        let made = crate::scene::generate::by_name("balls3").expect("a generated scene");
+        let camera = made.camera.with_aspect(1.5);
+        let map = find_visibility(&made.scene, &camera);
+        let aovs = AovSettings::default();
+        // Root mean square of what the opacity is off by, scaled by `scale` along y.
+        let error_of = |n: u32, scale: f64| {
+            let seen = find_spans(&made.scene, &camera, [90, 60], n);
+            let mut grid = PixelGrid::of_frame(90, (60.0 * scale).round() as u32);
+            grid.pixels_per_frame.x *= 1.25;
+            grid.origin.x = 10.5;
+            let (found, _) = render_spans(&seen, &grid, true, aovs).expect("is close enough");
+            let exact = render_window(&made.scene, &map, &grid, true);
+            let pairs = found.pixels.iter().zip(&exact.pixels);
+            let squares = pairs.map(|(a, b)| f64::from(a[3] - b[3]).powi(2));
+            (squares.sum::<f64>() / grid.pixel_count() as f64).sqrt()
+        };
+        // With n at equal scale, then with the scale at equal n.
+        for errors in [
+            [64, 16, 4, 1].map(|n| error_of(n, 1.0)),
+            [0.5, 1.0, 2.0, 4.0].map(|scale| error_of(8, scale)),
+        ] {
+            assert!(
+                errors.windows(2).all(|pair| 1.3 * pair[0] < pair[1]),
+                "{errors:?}"
+            );
+            assert!(errors[0] > 0.0, "multiscan is not exact");
+        }
+        // What is not scaled is what was rendered, to the last bit.
+        let seen = find_spans(&made.scene, &camera, [90, 60], 3);
+        let settings = RenderSettings {
+            sampling: Sampling::Multiscan(3),
+            ..unlit(90, 60)
+        };
+        let expected = render(&made.scene, &camera, &settings, |_| {}).picture;
+        let (found, _) =
+            render_spans(&seen, &PixelGrid::of_frame(90, 60), true, aovs).expect("is as it was");
+        assert!(found == expected);
+        let enlarged = PixelGrid::of_frame(90, 181);
+        let error = render_spans(&seen, &enlarged, true, aovs).expect_err("is too large");
+        assert!(
+            error.to_string().contains("up to 3 times as high"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -12,6 +12,9 @@ pub const MANIFEST: &str = "manifest.json";
 /// What the format calls itself.
 pub const FORMAT: &str = "veduta visibility map";
 
+/// What it calls itself where it holds spans of multiscan: programs that know only maps refuse it.
+pub const SPANS_FORMAT: &str = "veduta multiscan spans";
+
 /// Major version: readers refuse others. Minor version: readers skip what they do not know.
 pub const VERSION: [u32; 2] = [1, 1];
 
@@ -31,6 +34,10 @@ pub struct Manifest {
     pub lights: Vec<Light>,
     pub materials: Vec<Material>,
     pub sources: Vec<Source>,
+    /// Sub-scanlines of a row of pixels, in a file that holds spans in place of regions; since version
+    /// 1.1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sub_scanlines: Option<u32>,
     /// What casts shadows; since version 1.1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub casters: Option<CastersTold>,
@@ -105,7 +112,7 @@ impl Manifest {
             what: error.to_string(),
         };
         let Versioned { format, version } = serde_json::from_slice(bytes).map_err(unsound)?;
-        if format != FORMAT {
+        if format != FORMAT && format != SPANS_FORMAT {
             let what = format!("the format is {format:?}, not {FORMAT:?}");
             return Err(FileError::Unsound {
                 member: MANIFEST.into(),

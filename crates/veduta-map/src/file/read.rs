@@ -3,13 +3,14 @@
 use super::FileError;
 use super::casters;
 use super::container::{ArchiveReader, Member};
-use super::manifest::{MANIFEST, Manifest, Segment, Table};
+use super::manifest::{MANIFEST, Manifest, SPANS_FORMAT, Segment, Table};
 use super::message;
+use super::spans;
 use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
 use crate::scene::{Mesh, MeshId, Object, Scene};
 use crate::{
-    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, Reading, SeenScene, Side,
-    Source, VisibilityMap,
+    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, Reading, SeenScene, SeenSpans,
+    Side, Source, VisibilityMap,
 };
 use arrow_array::RecordBatch;
 use arrow_ipc::MetadataVersion;
@@ -69,10 +70,16 @@ impl<R: Read + Seek> MapReader<R> {
             else {
                 return unsound(format!("{name} is missing"));
             };
-            let of_tiles = TableName::OF_TILES.map(TableName::member).contains(&name);
-            if of_tiles && found.batches.len() != self.manifest.tiles.len() {
+            let is_of_tiles = self.of_tiles().iter().any(|table| table.member() == name);
+            if is_of_tiles && found.batches.len() != self.manifest.tiles.len() {
                 return unsound(format!("{name} does not have a batch for each tile"));
             }
+        }
+        if self.manifest.sub_scanlines.is_some() != (self.manifest.format == SPANS_FORMAT) {
+            return unsound("it is of spans and not of spans".into());
+        }
+        if !self.manifest.camera.is_sound() {
+            return unsound("the camera shows nothing: a number of it is 0 or negative".into());
         }
         if self.manifest.size.contains(&0) {
             return unsound("the picture has no pixels".into());
@@ -82,11 +89,23 @@ impl<R: Read + Seek> MapReader<R> {
 
     /// The members whose tables this program knows of, all of which must be there.
     fn known_tables(&self) -> Vec<&'static str> {
-        let mut names = TableName::ALL.map(TableName::member).to_vec();
+        let is_of_spans = self.sub_scanlines_per_row().is_some();
+        let mut names = self.of_tiles().to_vec();
+        names.extend([TableName::Objects, TableName::Images]);
+        let mut names: Vec<_> = names.into_iter().map(TableName::member).collect();
+        names.extend(is_of_spans.then_some(spans::MEMBER));
         if self.has_embedded_casters() {
             names.extend(casters::members());
         }
         names
+    }
+
+    /// The tables whose batches are tiles.
+    fn of_tiles(&self) -> &'static [TableName] {
+        match self.sub_scanlines_per_row() {
+            None => &TableName::OF_TILES,
+            Some(_) => &TableName::OF_FACES,
+        }
     }
 
     /// What is in the file and where.
@@ -112,6 +131,11 @@ impl<R: Read + Seek> MapReader<R> {
     /// The files that the scene was read from.
     pub fn sources(&self) -> &[Source] {
         &self.manifest.sources
+    }
+
+    /// Sub-scanlines of a row of pixels, if the file holds spans of multiscan in place of regions.
+    pub fn sub_scanlines_per_row(&self) -> Option<u32> {
+        self.manifest.sub_scanlines
     }
 
     /// Whether the file tells what casts, itself or by naming files.
@@ -141,7 +165,23 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`].
     pub fn read(&mut self) -> Result<SeenScene, FileError> {
+        self.refuse_spans()?;
         self.read_tiles(0..self.manifest.tiles.len())
+    }
+
+    /// Reads the faces of a file of spans, as a map of which nothing is seen.
+    pub(super) fn read_faces(&mut self) -> Result<SeenScene, FileError> {
+        self.read_tiles(0..self.manifest.tiles.len())
+    }
+
+    fn refuse_spans(&self) -> Result<(), FileError> {
+        match self.sub_scanlines_per_row() {
+            None => Ok(()),
+            Some(_) => Err(FileError::OtherContents {
+                found: "spans of multiscan",
+                expected: "regions, found exactly",
+            }),
+        }
     }
 
     /// Reads what is seen in a window of the image plane, from its left top corner to its right bottom
@@ -150,6 +190,7 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`].
     pub fn read_window(&mut self, [min, max]: [DVec2; 2]) -> Result<SeenScene, FileError> {
+        self.refuse_spans()?;
         let touches = |&[left, top, right, bottom]: &[f64; 4]| {
             left <= max.x && right >= min.x && top <= max.y && bottom >= min.y
         };
@@ -166,6 +207,25 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`], or what the map itself has against it.
     pub fn check(&mut self) -> Result<SeenScene, FileError> {
+        self.refuse_spans()?;
+        self.check_tables()?;
+        let seen = self.read()?;
+        let sound = seen.map.check();
+        sound.map_err(|invariant| FileError::unsound("the map", invariant.to_string()))?;
+        Ok(seen)
+    }
+
+    /// [`MapReader::check`] of a file that holds what multiscan found.
+    ///
+    /// # Errors
+    /// [`FileError`].
+    pub fn check_spans(&mut self) -> Result<SeenSpans, FileError> {
+        self.check_tables()?;
+        self.read_spans()
+    }
+
+    /// Compares every byte with its checksum, and reads what casts.
+    fn check_tables(&mut self) -> Result<(), FileError> {
         for member in self.archive.members().to_vec() {
             self.archive.check(&member)?;
         }
@@ -175,16 +235,13 @@ impl<R: Read + Seek> MapReader<R> {
             self.segment(table, start, &head)?;
         }
         self.read_casters()?;
-        let seen = self.read()?;
-        let sound = seen.map.check();
-        sound.map_err(|invariant| FileError::unsound("the map", invariant.to_string()))?;
-        Ok(seen)
+        Ok(())
     }
 
     fn read_tiles(&mut self, tiles: impl Iterator<Item = usize>) -> Result<SeenScene, FileError> {
         let mut rows = SeenRows::default();
         let mut of_tiles = Vec::new();
-        for table in TableName::OF_TILES {
+        for &table in self.of_tiles() {
             of_tiles.push(TableReader::new(self, table.member())?);
         }
         for tile in tiles {
@@ -200,9 +257,11 @@ impl<R: Read + Seek> MapReader<R> {
             let points = of(TableName::Points).points()?;
             rows.faces.extend(of(TableName::Faces).faces(&points)?);
             rows.vertices.extend(of(TableName::Vertices).vertices()?);
-            rows.opaque
-                .extend(of(TableName::Opaque).fragments(&points)?);
-            rows.veils.extend(of(TableName::Veils).fragments(&points)?);
+            if of_tiles.len() == TableName::OF_TILES.len() {
+                rows.opaque
+                    .extend(of(TableName::Opaque).fragments(&points)?);
+                rows.veils.extend(of(TableName::Veils).fragments(&points)?);
+            }
         }
         let mut scene = Scene {
             materials: self.manifest.materials.clone(),
@@ -287,6 +346,7 @@ impl Table {
 /// A table whose tail was read, in which its schema stands.
 struct TableReader {
     name: &'static str,
+    schema: SchemaRef,
     decoder: FileDecoder,
     /// Where each batch begins, and what its bytes are.
     starts: Vec<(u64, Segment)>,
@@ -312,7 +372,8 @@ impl TableReader {
         Ok(Self {
             name,
             starts: starts.collect(),
-            decoder: FileDecoder::new(schema, MetadataVersion::V5),
+            decoder: FileDecoder::new(Arc::clone(&schema), MetadataVersion::V5),
+            schema,
         })
     }
 
@@ -327,7 +388,7 @@ impl TableReader {
             let what = format!("batch {index} cannot be read: {why}");
             FileError::unsound(self.name, what)
         };
-        let block = message::check_batch(&bytes).map_err(no_batch)?;
+        let block = message::check_batch(&bytes, &self.schema).map_err(no_batch)?;
         let batch = self.decoder.read_record_batch(&block, &bytes.into());
         let batch = batch.map_err(|error| no_batch(&error.to_string()))?;
         batch.ok_or_else(|| no_batch("it is none"))
@@ -397,6 +458,14 @@ impl SeenRows {
             .find(|pair| pair[0].face == pair[1].face)
         {
             return Err(twice("face", pair[0].face));
+        }
+        let count = self.faces.len();
+        if manifest.sub_scanlines.is_some()
+            && let Some(last) = self.faces.last()
+            && last.face as usize + 1 != count
+        {
+            let what = format!("{count} faces, but the last is {}", last.face);
+            return Err(FileError::unsound(faces, what));
         }
         let key = |row: &VertexRow| (row.object, row.vertex);
         if let Some(pair) = self
@@ -480,6 +549,10 @@ impl SeenRows {
             }
             if row.outline.len() < 3 {
                 return Err(misfit("its outline is not a polygon"));
+            }
+            // The table would turn it, and its sides would be others.
+            if !(veduta_geometry::signed_area(&row.outline) > 0.0) {
+                return Err(misfit("its outline has no area or is not wound clockwise"));
             }
             let object = ObjectId(row.object);
             let id = table.push(&row.outline, planes[&row.plane], object, source);

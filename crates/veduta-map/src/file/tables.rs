@@ -41,7 +41,8 @@ impl TableName {
     /// Tables whose batches are tiles, in the order in which they stand in a file.
     pub const OF_TILES: [Self; 5] = [Points, Vertices, Faces, Opaque, Veils];
 
-    pub const ALL: [Self; 7] = [Points, Vertices, Faces, Opaque, Veils, Objects, Images];
+    /// Those of them that tell of faces; the others tell where these are seen.
+    pub const OF_FACES: [Self; 3] = [Points, Vertices, Faces];
 
     /// Name of the member.
     pub fn member(self) -> &'static str {

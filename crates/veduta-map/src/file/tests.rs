@@ -6,7 +6,7 @@ use crate::scene::{
 };
 use crate::{
     Camera, Casters, Choice, FaceId, Faces, Fragments, MaterialId, ObjectId, Origin, Projection,
-    Reading, SeenScene, Side, Source,
+    Reading, SeenScene, SeenSpans, Side, Source, Span, SpanBand, Spans,
 };
 use std::io::{Cursor, Write};
 use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
@@ -104,7 +104,7 @@ fn scene(faces: u32) -> Scene {
 }
 
 /// A map of [`scene`]. It is not what the camera sees: files do not ask.
-fn seen(faces: u32) -> SeenScene {
+pub(super) fn seen(faces: u32) -> SeenScene {
     let scene = scene(faces);
     let mut table = Faces::new();
     let (mut opaque, mut veils) = (Fragments::new(), Fragments::new());
@@ -160,7 +160,7 @@ fn source(path: &str) -> Source {
     }
 }
 
-fn written_of(seen: &SeenScene, casters: Option<Casters>) -> Vec<u8> {
+pub(super) fn written_of(seen: &SeenScene, casters: Option<Casters>) -> Vec<u8> {
     let origin = Origin {
         sources: vec![source("town.glb")],
         casters,
@@ -169,12 +169,49 @@ fn written_of(seen: &SeenScene, casters: Option<Casters>) -> Vec<u8> {
     out.into_inner()
 }
 
+/// Some spans of [`scene`].
+pub(super) fn seen_spans() -> SeenSpans {
+    let seen = seen(12);
+    let (width, height, per_row) = (40, 70, 2);
+    let faces = seen.map.faces.len() as u32;
+    let mut bands: Vec<SpanBand> = Vec::new();
+    for band in 0..3 {
+        let first = 64 * band;
+        let mut band = SpanBand {
+            first,
+            ..SpanBand::default()
+        };
+        for line in first..(first + 64).min(per_row * height + 1) {
+            // Along some nothing is seen.
+            for k in 0..line % 4 {
+                let left = 7.3 * f64::from(k) + 0.1;
+                let face = FaceId((line + k) % faces);
+                let right = left + 1.0 + f64::from(line % 9) / 1.5;
+                band.spans.push(Span { face, left, right });
+            }
+            band.ends.push(band.spans.len() as u32);
+        }
+        bands.push(band);
+    }
+    let spans = Spans::new(width, height, per_row, bands);
+    SeenSpans::of(&seen.scene, &seen.map.camera, seen.map.faces, &spans)
+}
+
+pub(super) fn written_spans(seen: &SeenSpans) -> Vec<u8> {
+    let origin = Origin {
+        sources: vec![source("town.glb")],
+        casters: Some(Casters::default()),
+    };
+    let out = write_spans(Cursor::new(Vec::new()), seen, &origin).expect("memory takes all");
+    out.into_inner()
+}
+
 fn written(seen: &SeenScene) -> Vec<u8> {
     written_of(seen, None)
 }
 
 /// A scene that casts: what [`seen`] is a part of, with an image of its own and meshes of all kinds.
-fn casters(faces: u32) -> Casters {
+pub(super) fn casters(faces: u32) -> Casters {
     let mut scene = scene(faces);
     let tangle = |faces: u32| Mesh {
         normals: Vec::new(),
@@ -279,6 +316,40 @@ fn casters_are_read_bit_for_bit_by_those_who_ask() {
     let unknown = written(&seen(12));
     let mut reader = MapReader::new(Cursor::new(&unknown)).expect("sound");
     assert!(reader.read_casters().expect("sound").is_none());
+}
+
+#[test]
+fn spans_are_read_bit_for_bit_and_are_no_map() {
+    let seen = seen_spans();
+    assert!(seen.spans.len() > 100);
+    let bytes = written_spans(&seen);
+    assert!(bytes == written_spans(&seen));
+    let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+    assert!(reader.check_spans().expect("sound") == seen);
+    assert_eq!(
+        reader.read_casters().expect("sound"),
+        Some(Casters::default())
+    );
+    for refused in [reader.read(), reader.check()] {
+        let message = refused.expect_err("is no map").to_string();
+        assert!(message.contains("holds spans of multiscan"), "{message}");
+    }
+    let mut reader = MapReader::new(Cursor::new(written(&super::tests::seen(12)))).expect("sound");
+    let message = reader.read_spans().expect_err("is a map").to_string();
+    assert!(message.contains("holds regions"), "{message}");
+
+    // Also where nothing is seen.
+    let mut empty = seen;
+    let band = SpanBand {
+        first: 0,
+        spans: Vec::new(),
+        ends: vec![0; 141],
+    };
+    empty.spans = Spans::new(40, 70, 2, vec![band]);
+    let empty = SeenSpans::of(&empty.scene, &empty.camera, empty.faces, &empty.spans);
+    let bytes = written_spans(&empty);
+    let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+    assert!(reader.check_spans().expect("sound") == empty);
 }
 
 #[test]

@@ -3,10 +3,12 @@
 use super::FileError;
 use super::casters::write_casters;
 use super::container::ArchiveWriter;
-use super::manifest::{FORMAT, MANIFEST, Manifest, Segment, Table, VERSION};
+use super::manifest::{FORMAT, MANIFEST, Manifest, SPANS_FORMAT, Segment, Table, VERSION};
+use super::spans::write_span_table;
 use super::tables::{TableName, TileBatches, image_row, object_rows};
 use super::tiles::tiles;
-use crate::{Origin, SeenScene};
+use crate::scene::Scene;
+use crate::{Origin, SeenScene, SeenSpans, Spans, VisibilityMap};
 use arrow_array::RecordBatch;
 use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
@@ -29,13 +31,56 @@ pub fn write_map<W: Write + Seek>(
     seen: &SeenScene,
     origin: &Origin,
 ) -> Result<W, FileError> {
-    let (map, scene) = (&seen.map, &seen.scene);
+    let regions = Regions::Fragments;
+    write_seen(out, &seen.map, &seen.scene, seen.size, &regions, origin)
+}
+
+/// Writes what multiscan found to `out`, from its byte 0 on, and what `origin` tells of it.
+///
+/// # Errors
+/// Those of `out`.
+///
+/// # Panics
+/// If `seen` is not in normal form or scaled, or a mesh that casts is unsound.
+pub fn write_spans<W: Write + Seek>(
+    out: W,
+    seen: &SeenSpans,
+    origin: &Origin,
+) -> Result<W, FileError> {
+    let size = [seen.spans.width(), seen.spans.height()];
+    let regions = Regions::Spans(&seen.spans);
+    write_seen(out, &seen.as_map(), &seen.scene, size, &regions, origin)
+}
+
+/// How a file tells where faces are seen.
+enum Regions<'a> {
+    /// By the fragments of the map.
+    Fragments,
+    /// By spans; of the map only the faces count.
+    Spans(&'a Spans),
+}
+
+fn write_seen<W: Write + Seek>(
+    out: W,
+    map: &VisibilityMap,
+    scene: &Scene,
+    size: [u32; 2],
+    regions: &Regions,
+    origin: &Origin,
+) -> Result<W, FileError> {
     let mut writer = TableWriter::new(out);
     let mut write = |table: TableName, batches: &mut dyn Iterator<Item = RecordBatch>| {
         writer.write(table.member(), &table.schema(), batches)
     };
     let tiles = tiles(map);
-    for table in TableName::OF_TILES {
+    let (format, of_tiles, sub_scanlines) = match regions {
+        Regions::Fragments => (FORMAT, &TableName::OF_TILES[..], None),
+        Regions::Spans(spans) => {
+            let per_row = spans.sub_scanlines_per_row();
+            (SPANS_FORMAT, &TableName::OF_FACES[..], Some(per_row))
+        }
+    };
+    for &table in of_tiles {
         // Made again for each table: the rows of all tiles together would be as large as the map.
         let batches = tiles
             .iter()
@@ -45,21 +90,25 @@ pub fn write_map<W: Write + Seek>(
     let objects = scene.objects.chunks(OBJECTS_PER_BATCH);
     write(TableName::Objects, &mut objects.map(object_rows))?;
     write(TableName::Images, &mut scene.images.iter().map(image_row))?;
+    if let Regions::Spans(spans) = regions {
+        write_span_table(&mut writer, spans)?;
+    }
     let casters = match &origin.casters {
         Some(casters) => Some(write_casters(&mut writer, casters, &scene.images)?),
         None => None,
     };
     writer.finish(|tables| Manifest {
-        format: FORMAT.into(),
+        format: format.into(),
         version: VERSION,
         generator: concat!("veduta ", env!("CARGO_PKG_VERSION")).into(),
-        size: seen.size,
+        size,
         camera: map.camera,
         world: scene.world.clone(),
         layers: scene.layers.clone(),
         lights: scene.lights.clone(),
         materials: scene.materials.clone(),
         sources: origin.sources.clone(),
+        sub_scanlines,
         casters,
         tiles: tiles.iter().map(|tile| tile.bounds).collect(),
         tables,

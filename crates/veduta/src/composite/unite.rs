@@ -32,6 +32,14 @@ pub enum CompositeError {
         /// In what they differ.
         difference: String,
     },
+    /// Spans meet on common sub-scanlines only.
+    #[error("picture {index} was sampled otherwise than the first: {difference}")]
+    OtherSampling {
+        /// Which of the pictures.
+        index: usize,
+        /// In what they differ.
+        difference: String,
+    },
 }
 
 /// What is seen of all maps together: composite(A, B, …) is the map of A and B and …
@@ -53,17 +61,15 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
     let shown = maps.len();
     let maps: Vec<&SeenScene> = maps.iter().chain(holdouts).collect();
     let first = maps.first().ok_or(CompositeError::Nothing)?;
-    for (index, other) in maps.iter().enumerate().skip(1) {
-        if let Some(difference) = camera_difference(&first.map.camera, &other.map.camera) {
-            return Err(CompositeError::OtherCamera { index, difference });
-        }
-        if let Some(difference) = world_difference(&first.scene.world, &other.scene.world) {
-            return Err(CompositeError::OtherWorld { index, difference });
-        }
-    }
-    let united = UnitedScenes::of(&maps);
+    let views = maps
+        .iter()
+        .map(|seen| (&seen.map.camera, &seen.scene.world));
+    refuse_other_views(views)?;
+    let scenes: Vec<&Scene> = maps.iter().map(|seen| &seen.scene).collect();
+    let united = UnitedScenes::of(&scenes);
     let groups = PlaneGroups::of(&united.scene);
-    let (faces, new_ids) = united.faces(&maps, &groups);
+    let tables: Vec<&Faces> = maps.iter().map(|seen| &seen.map.faces).collect();
+    let (faces, new_ids) = united.faces(&tables, &groups);
     let seen: Vec<Seen> = maps
         .iter()
         .zip(&new_ids)
@@ -95,6 +101,30 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
         veils,
     };
     Ok(SeenScene::of(&united.scene, &map, first.size))
+}
+
+/// Fails on the first view that cannot be composited with that before all.
+pub(super) fn refuse_other_views<'a>(
+    mut views: impl Iterator<Item = (&'a Camera, &'a World)>,
+) -> Result<(), CompositeError> {
+    let Some((camera, world)) = views.next() else {
+        return Err(CompositeError::Nothing);
+    };
+    for (index, (other_camera, other_world)) in (1..).zip(views) {
+        if let Some(difference) = camera_difference(camera, other_camera) {
+            return Err(CompositeError::OtherCamera { index, difference });
+        }
+        if let Some(difference) = world_difference(world, other_world) {
+            return Err(CompositeError::OtherWorld { index, difference });
+        }
+    }
+    Ok(())
+}
+
+/// Scenes as one, with their objects in the order of [`Scene::key_order`]; also where they are told scene
+/// by scene or united before. Cameras, meshes without an object and layers without one are left out.
+pub fn unite(scenes: &[&Scene]) -> Scene {
+    UnitedScenes::of(scenes).scene
 }
 
 /// In what two cameras differ, in words for the user. Near planes may: nearness does not depend on them.
@@ -162,53 +192,58 @@ fn world_difference(one: &World, other: &World) -> Option<String> {
     })
 }
 
-/// The scenes of several maps as one.
-struct UnitedScenes {
-    scene: Scene,
-    /// Of each map, the new numbers of its objects.
+/// Several scenes as one.
+pub(super) struct UnitedScenes {
+    pub scene: Scene,
+    /// Of each of them, the new numbers of its objects.
     objects: Vec<Vec<ObjectId>>,
 }
 
 impl UnitedScenes {
-    fn of(maps: &[&SeenScene]) -> Self {
-        let mut scene = Scene {
-            world: maps
-                .iter()
-                .map(|seen| &seen.scene.world)
-                .find(|world| world.crs.is_some())
-                .unwrap_or(&maps[0].scene.world)
-                .clone(),
+    pub fn of(scenes: &[&Scene]) -> Self {
+        let placed = scenes.iter().find(|scene| scene.world.crs.is_some());
+        let mut united = Scene {
+            world: placed
+                .or(scenes.first())
+                .map_or_else(World::default, |scene| scene.world.clone()),
             ..Scene::default()
         };
         let mut order: Vec<(ObjectKey, usize, ObjectId)> = Vec::new();
-        for (map, SeenScene { scene, .. }) in maps.iter().enumerate() {
+        for (number, scene) in scenes.iter().enumerate() {
             let objects = (0..scene.objects.len()).map(ObjectId::from_index);
-            order.extend(objects.map(|object| (scene.key_of(object), map, object)));
+            order.extend(objects.map(|object| (scene.key_of(object), number, object)));
         }
         order.sort_unstable();
-        let has_layers = maps.iter().any(|seen| !seen.scene.layers.is_empty());
-        let mut objects: Vec<Vec<ObjectId>> = maps
+        let has_layers = scenes.iter().any(|scene| !scene.layers.is_empty());
+        let mut objects: Vec<Vec<ObjectId>> = scenes
             .iter()
-            .map(|seen| vec![ObjectId(0); seen.scene.objects.len()])
+            .map(|scene| vec![ObjectId(0); scene.objects.len()])
             .collect();
-        let mut meshes: Vec<&Mesh> = Vec::new();
-        let mut of_map: Vec<usize> = Vec::new();
-        for &((Reverse(priority), layer, _), map, object) in &order {
-            let id = ObjectId::from_index(scene.objects.len());
-            objects[map][object.index()] = id;
-            let from = &maps[map].scene;
-            meshes.push(from.mesh_of(object));
-            of_map.push(map);
-            scene.objects.push(Object {
-                mesh: MeshId(id.0),
-                ..from.object(object).clone()
+        // Objects that share a mesh go on to do so.
+        let mut new_meshes: Vec<Vec<Option<MeshId>>> = scenes
+            .iter()
+            .map(|scene| vec![None; scene.meshes.len()])
+            .collect();
+        let mut meshes: Vec<(usize, &Mesh)> = Vec::new();
+        for &((Reverse(priority), layer, _), number, object) in &order {
+            let id = ObjectId::from_index(united.objects.len());
+            objects[number][object.index()] = id;
+            let from = scenes[number].object(object);
+            let new_mesh = &mut new_meshes[number][from.mesh.0 as usize];
+            let mesh = *new_mesh.get_or_insert_with(|| {
+                meshes.push((number, scenes[number].mesh_of(object)));
+                MeshId(meshes.len() as u32 - 1)
+            });
+            united.objects.push(Object {
+                mesh,
+                ..from.clone()
             });
             if has_layers {
-                match scene.layers.last_mut() {
+                match united.layers.last_mut() {
                     Some(last) if last.name == layer && last.priority == priority => {
                         last.objects.end = id.0 + 1;
                     }
-                    _ => scene.layers.push(Layer {
+                    _ => united.layers.push(Layer {
                         name: layer.into(),
                         priority,
                         objects: id.0..id.0 + 1,
@@ -216,52 +251,52 @@ impl UnitedScenes {
                 }
             }
         }
-        let first_material: Vec<u32> = maps
+        let first_material: Vec<u32> = scenes
             .iter()
-            .map(|seen| add_materials(&mut scene, &seen.scene.materials, &seen.scene.images))
+            .map(|scene| add_materials(&mut united, &scene.materials, &scene.images))
             .collect();
-        for (mesh, map) in meshes.into_iter().zip(of_map) {
+        for (number, mesh) in meshes {
             let mut mesh = mesh.clone();
             for (_, material) in &mut mesh.materials {
-                *material = MaterialId(material.0 + first_material[map]);
+                *material = MaterialId(material.0 + first_material[number]);
             }
-            scene.meshes.push(mesh);
+            united.meshes.push(mesh);
         }
-        for seen in maps {
-            for light in &seen.scene.lights {
-                if !scene.lights.contains(light) {
-                    scene.lights.push(light.clone());
-                }
+        for light in scenes.iter().flat_map(|scene| &scene.lights) {
+            if !united.lights.contains(light) {
+                united.lights.push(light.clone());
             }
         }
-        Self { scene, objects }
+        Self {
+            scene: united,
+            objects,
+        }
     }
 
-    /// The faces of all maps as one table in the order of the objects, and of each map the new numbers
-    /// of its faces. Faces of one plane share it.
-    fn faces(&self, maps: &[&SeenScene], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
+    /// The faces of all scenes as one table in the order of the objects, and of each scene the new
+    /// numbers of its faces. Faces of one plane share it.
+    pub fn faces(&self, tables: &[&Faces], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
         let mut order: Vec<(ObjectId, FaceId, usize)> = Vec::new();
-        for (map, seen) in maps.iter().enumerate() {
-            let table = &seen.map.faces;
+        for (map, table) in tables.iter().enumerate() {
             let object = |face: FaceId| self.objects[map][table.object(face).index()];
             order.extend(table.ids().map(|face| (object(face), face, map)));
         }
         order.sort_unstable();
         let mut faces = Faces::with_capacity(order.len());
-        let mut new_ids: Vec<Vec<FaceId>> = maps
+        let mut new_ids: Vec<Vec<FaceId>> = tables
             .iter()
-            .map(|seen| vec![FaceId(0); seen.map.faces.len()])
+            .map(|table| vec![FaceId(0); table.len()])
             .collect();
-        let mut first_plane = Vec::with_capacity(maps.len());
-        for seen in maps {
+        let mut first_plane = Vec::with_capacity(tables.len());
+        for table in tables {
             first_plane.push(faces.planes().len() as u32);
-            let planes: &[Affine] = seen.map.faces.planes();
+            let planes: &[Affine] = table.planes();
             planes.iter().for_each(|&plane| {
                 faces.push_plane(plane);
             });
         }
         for (object, face, map) in order {
-            let table = &maps[map].map.faces;
+            let table = tables[map];
             let plane = PlaneId(table.plane(face).0 + first_plane[map]);
             let id = faces.push(table.outline(face), plane, object, table.source(face));
             let id = id.expect("a face of a table has an area");
