@@ -1,5 +1,6 @@
 //! The verbs, pictures and pipes as users meet them.
 
+mod casters;
 mod check;
 mod deep;
 mod diff;
@@ -11,6 +12,7 @@ mod pictures;
 mod pipes;
 mod preview;
 mod readme;
+mod spans;
 mod stored;
 
 use assert_cmd::Command;
