@@ -2,7 +2,7 @@
 //!
 //! The format itself is [`veduta::map::file`]; here are the places, as of all other files.
 
-use crate::write::PartialFile;
+use crate::write::{PartialFile, is_stream};
 use std::collections::HashSet;
 use std::fs::File;
 use std::io::BufReader;
@@ -145,6 +145,11 @@ fn write_file(
 ) -> Result<(), MapFileError> {
     let origin = seen_from(path, origin.clone());
     let write = || {
+        if is_stream(path) {
+            // It would be put in the place of the device.
+            let message = "a map is written into a plain file, not into a device or a pipe";
+            return Err(io("cannot be written")(std::io::Error::other(message)));
+        }
         let partial = PartialFile::create(path).map_err(io("cannot be written"))?;
         let partial = write(partial, &origin)?;
         partial.finish().map_err(io("cannot be written"))

@@ -270,12 +270,11 @@ impl Render {
             ..RenderSettings::default()
         };
         let picture_size = [size.width, size.height];
-        let (samples, shortcomings) = target.write(scene, *camera, picture_size, |sink| {
+        let (samples, ()) = target.write(scene, *camera, picture_size, |sink| {
             let begin = |step| tell_step(step, talk);
             pipeline::render_deep(scene, camera, &settings, begin, |rows| sink.write(rows))
         })?;
         talk.end();
-        tell_shortcomings(&self.model, scene, &shortcomings, self.strict, talk)?;
         talk.detail(format_args!(
             "{} faces, {samples} samples",
             scene.face_count()
@@ -354,7 +353,11 @@ impl Render {
                 let map = pipeline::find_visibility(&scene, &camera);
                 Stored::Regions(SeenScene::of(&scene, &map, size))
             }
-            Sampling::Multiscan(n) => Stored::Spans(pipeline::find_spans(&scene, &camera, size, n)),
+            Sampling::Multiscan(n) => {
+                let (seen, left_out) = pipeline::find_spans(&scene, &camera, size, n);
+                tell_shortcomings(&self.model, &scene, &left_out, self.strict, talk)?;
+                Stored::Spans(seen)
+            }
         };
         talk.begin("writing");
         seen.write(place, &self.origin(scene, loaded.files))?;

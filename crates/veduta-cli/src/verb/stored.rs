@@ -184,9 +184,7 @@ impl Stored {
     pub fn shortcomings(&self) -> Vec<Shortcoming> {
         match self {
             Self::Regions(seen) => pipeline::shortcomings(&seen.scene, &seen.map),
-            Self::Spans(seen) => {
-                pipeline::shortcomings_of_spans(&seen.scene, &seen.faces, &seen.spans)
-            }
+            Self::Spans(seen) => pipeline::shortcomings_of_spans(seen),
         }
     }
 

@@ -12,12 +12,25 @@ fn a_map_names_all_files_of_its_scene_or_keeps_it_whole() {
     assert_eq!(told["sources"], json!(["town.obj", "m.mtl"]));
     let again = json!({ "embedded": false, "readAgain": ["town.obj"] });
     assert_eq!(told["casters"], again);
-    assert!(folder.told("info town.veduta").contains("casters   read again from town.obj"));
+    assert!(
+        folder
+            .told("info town.veduta")
+            .contains("casters   read again from town.obj")
+    );
 
-    folder.told(&format!("render town.obj {FACING} -o whole.veduta --self-contained"));
+    folder.told(&format!(
+        "render town.obj {FACING} -o whole.veduta --self-contained"
+    ));
     let told = folder.json("info whole.veduta");
-    assert_eq!(told["casters"], json!({ "embedded": true, "readAgain": [] }));
-    assert!(folder.told("info whole.veduta").contains("casters   kept in the file"));
+    assert_eq!(
+        told["casters"],
+        json!({ "embedded": true, "readAgain": [] })
+    );
+    assert!(
+        folder
+            .told("info whole.veduta")
+            .contains("casters   kept in the file")
+    );
     for file in ["town.obj", "m.mtl"] {
         std::fs::remove_file(folder.path(file)).expect("is there");
     }
@@ -37,7 +50,10 @@ fn sources_that_are_not_as_they_were_are_named() {
     folder.write("m.mtl", "newmtl red\nKd 0 1 0\n");
     std::fs::remove_file(folder.path("town.obj")).expect("is there");
     folder.told("check town.veduta");
-    let failed = folder.veduta("check --sources town.veduta").assert().code(1);
+    let failed = folder
+        .veduta("check --sources town.veduta")
+        .assert()
+        .code(1);
     let failed = failed.stdout(contains("m.mtl: has changed since"));
     failed.stdout(contains("town.obj: is needed"));
 }
@@ -48,8 +64,12 @@ fn a_composite_keeps_what_casts_of_all() {
     for name in ["wall", "box"] {
         folder.write(&format!("{name}.obj"), folder.read("town.obj"));
     }
-    folder.told(&format!("render wall.obj {FACING} -o wall.veduta --self-contained"));
-    folder.told(&format!("render box.obj {FACING} -o box.veduta --self-contained"));
+    folder.told(&format!(
+        "render wall.obj {FACING} -o wall.veduta --self-contained"
+    ));
+    folder.told(&format!(
+        "render box.obj {FACING} -o box.veduta --self-contained"
+    ));
     folder.told(&format!("render town.obj {FACING} -o town.veduta"));
     let casters = |maps: &str| {
         folder.told(&format!("composite {maps} -o all.veduta --force"));
@@ -59,9 +79,15 @@ fn a_composite_keeps_what_casts_of_all() {
     let both = casters("wall.veduta box.veduta");
     assert_eq!(both, json!({ "embedded": true, "readAgain": [] }));
     let mixed = casters("wall.veduta town.veduta");
-    assert_eq!(mixed, json!({ "embedded": true, "readAgain": ["town.obj"] }));
+    assert_eq!(
+        mixed,
+        json!({ "embedded": true, "readAgain": ["town.obj"] })
+    );
     let again = casters("town.veduta --without box");
-    assert_eq!(again, json!({ "embedded": false, "readAgain": ["town.obj"] }));
+    assert_eq!(
+        again,
+        json!({ "embedded": false, "readAgain": ["town.obj"] })
+    );
     // From another folder files are found from there.
     std::fs::create_dir(folder.path("maps")).expect("may write in the test's folder");
     folder.told("composite wall.veduta town.veduta -o maps/all.veduta");

@@ -35,7 +35,10 @@ fn a_stored_map_gives_the_deep_picture_of_its_scene() {
         let told = folder.json("shade town.veduta -o found.exr --deep");
         assert!(told["samples"].as_u64() > Some(0), "{told}");
         assert_eq!(told["facesProjected"], 0, "nothing is found anew");
-        assert!(folder.read("expected.exr") == folder.read("found.exr"), "{view}");
+        assert!(
+            folder.read("expected.exr") == folder.read("found.exr"),
+            "{view}"
+        );
     }
     // A part of it, enlarged, in another colour.
     let part = "--scale 2.5 --window 20.5,30,70,50 --set material.red.color=#446";
@@ -59,10 +62,21 @@ fn openimageio_lays_our_deep_pictures_flat_as_we_do() {
     folder.told("render town.obj --eye 3,-5,2 --size 61x47 -o town.veduta");
     folder.told("shade town.veduta -o flat.exr");
     for how in ["zips", "rle", "none"] {
-        folder.told(&format!("shade town.veduta -o deep.exr --deep --compression {how}"));
+        folder.told(&format!(
+            "shade town.veduta -o deep.exr --deep --compression {how}"
+        ));
         let flatten = std::process::Command::new("oiiotool")
             .current_dir(folder.place())
-            .args(["deep.exr", "--flatten", "--ch", "R,G,B,A", "-d", "float", "-o", "theirs.exr"])
+            .args([
+                "deep.exr",
+                "--flatten",
+                "--ch",
+                "R,G,B,A",
+                "-d",
+                "float",
+                "-o",
+                "theirs.exr",
+            ])
             .output();
         let flatten = match flatten {
             Ok(flatten) => flatten,
@@ -74,7 +88,10 @@ fn openimageio_lays_our_deep_pictures_flat_as_we_do() {
         let said = String::from_utf8_lossy(&flatten.stderr).into_owned();
         assert!(flatten.status.success(), "{how}: {said}");
         let found = folder.json("diff flat.exr theirs.exr --tolerance 10");
-        assert!(found["max"].as_f64().expect("a number") < 1e-5, "{how}: {found}");
+        assert!(
+            found["max"].as_f64().expect("a number") < 1e-5,
+            "{how}: {found}"
+        );
     }
 }
 

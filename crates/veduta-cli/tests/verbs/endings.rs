@@ -80,15 +80,28 @@ fn a_map_that_cannot_be_written_to_its_end_leaves_the_old_one() {
         let killed = limited(&folder, blocks, "", &render);
         // Or, where that is ignored, told that there is no room.
         let refused = limited(&folder, blocks, "trap '' XFSZ;", &render);
-        assert_eq!(folder.files(), before, "{blocks} blocks: nothing is left over");
-        assert!(folder.read("town.veduta") == old, "{blocks} blocks: the old map is there");
-        assert!(killed.status.signal().is_some(), "{blocks} blocks: {killed:?}");
+        assert_eq!(
+            folder.files(),
+            before,
+            "{blocks} blocks: nothing is left over"
+        );
+        assert!(
+            folder.read("town.veduta") == old,
+            "{blocks} blocks: the old map is there"
+        );
+        assert!(
+            killed.status.signal().is_some(),
+            "{blocks} blocks: {killed:?}"
+        );
         let said = String::from_utf8_lossy(&refused.stderr).into_owned();
         assert_eq!(refused.status.code(), Some(6), "{blocks} blocks: {said}");
         assert!(said.contains("town.veduta: "), "{blocks} blocks: {said}");
     }
     folder.told(&render);
-    assert!(folder.read("town.veduta") == new, "without a limit it is written");
+    assert!(
+        folder.read("town.veduta") == new,
+        "without a limit it is written"
+    );
 }
 
 #[test]
