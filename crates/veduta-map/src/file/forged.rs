@@ -190,7 +190,7 @@ fn forged_bytes_of_tables_are_refused_or_read() {
         let sound = Parts::of(&sound);
         assert!(reads(&sound.bytes(), name), "{name} is sound");
         let mut random = Random(1);
-        let cases = 4000 * effort();
+        let cases = 2000 * effort();
         let mut refused = 0;
         for case in 0..cases {
             let mut parts = sound.clone();
@@ -229,7 +229,7 @@ fn forged_rows_are_refused_or_read() {
     for (name, sound) in sound_files() {
         let sound = Parts::of(&sound);
         let mut random = Random(2);
-        let cases = 3000 * effort();
+        let cases = 1500 * effort();
         let mut refused = 0;
         for case in 0..cases {
             let mut parts = sound.clone();

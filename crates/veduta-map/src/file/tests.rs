@@ -128,8 +128,10 @@ pub(super) fn seen(faces: u32) -> SeenScene {
             match source % 5 {
                 0 => opaque.push_whole(face),
                 1 => {
-                    opaque.push_cut(face, outline.into_iter().zip(sides));
-                    opaque.push_cut(face, outline.into_iter().zip(sides));
+                    let [p, q, r] = outline;
+                    let middle = 0.5 * (p + q);
+                    opaque.push_cut(face, [p, middle, r].into_iter().zip(sides));
+                    opaque.push_cut(face, [middle, q, r].into_iter().zip(sides));
                 }
                 2 => {
                     table.set_veil(face);
