@@ -2,7 +2,7 @@ use super::*;
 use crate::scene::generate;
 use crate::visibility::project;
 use veduta_geometry::{Affine, DVec2, signed_area};
-use veduta_map::ObjectId;
+use veduta_map::{FaceId, ObjectId};
 
 /// Faces of the given outlines and nearness.
 fn faces(outlines: &[(&[[f64; 2]], Affine)]) -> Faces {
