@@ -41,8 +41,8 @@ pub struct Output {
     /// Write further channels into an .exr, separated by commas
     ///
     /// Depth, normal, position and numbers are those of the face that covers most of the pixel, at the
-    /// centroid of what is seen of it, and not filtered; albedo and Cryptomatte are exact areas. Where
-    /// nothing is seen, depth is 1e10 and all else 0. The camera is told by worldToCamera and
+    /// centroid of what is seen of it, and not filtered; albedo and Cryptomatte are exact areas, whatever
+    /// the --filter. Where nothing is seen, depth is 1e10 and all else 0. The camera is told by worldToCamera and
     /// worldToNDC.
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "output")]
     aov: Vec<AovArgument>,
