@@ -6,9 +6,9 @@ use crate::shade::Radiance;
 /// Filters that reach beyond the pixel: a pixel is the sum over the parts of cells around it of weight times
 /// radiance.
 ///
-/// What is diced and shaded are the cells between the pixels' centres ([`PixelGrid::between_centres`]), on which
-/// a kernel is a polynomial. It is exact wherever radiance is constant over a part, as the box filter is;
-/// elsewhere the error goes with the square of the cells' size.
+/// What is diced and shaded are the cells between the pixels' centres ([`PixelGrid::between_centres`]),
+/// on which a kernel is a polynomial. It is exact wherever radiance is constant over a part, as the box
+/// filter is; elsewhere the error goes with the square of the cells' size.
 #[derive(Clone, Debug)]
 pub struct KernelFilter<const N: usize> {
     kernel: CellKernel<N>,
@@ -108,8 +108,8 @@ impl<const N: usize> KernelFilter<N> {
         }
     }
 
-    /// Adds what fills cells. All cells have the same weights, so that it is summed by cell, then filtered along
-    /// x, then along y.
+    /// Adds what fills cells. All cells have the same weights, so that it is summed by cell, then
+    /// filtered along x, then along y.
     fn add_filled(
         &self,
         parts: &Parts,
@@ -159,9 +159,9 @@ impl<const N: usize> KernelFilter<N> {
 
 /// What the sums of pixels are multiplied by where the frame ends, along each axis.
 ///
-/// What lies outside the frame is not known. So a pixel that the frame contains is the mean over what its kernel
-/// reaches inside, and a plain scene stays plain up to the frame's border; of a pixel that the frame contains in part, that mean
-/// counts as much as the part, as in the box filter.
+/// What lies outside the frame is not known. So a pixel that the frame contains is the mean over what
+/// its kernel reaches inside, and a plain scene stays plain up to the frame's border; of a pixel that
+/// the frame contains in part, that mean counts as much as the part, as in the box filter.
 #[derive(Clone, Debug)]
 struct FrameShares {
     columns: Vec<f64>,

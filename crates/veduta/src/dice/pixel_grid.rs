@@ -47,9 +47,9 @@ impl PixelGrid {
         }
     }
 
-    /// The grid of cells between the centres of pixels that lie within `radius` pixels from the centres of these: the first
-    /// begins at `radius` before the first centre, along both axes. `cells` cells lie along the side of a
-    /// pixel.
+    /// The grid of cells between the centres of pixels that lie within `radius` pixels from the centres
+    /// of these: the first begins at `radius` before the first centre, along both axes. `cells` cells
+    /// lie along the side of a pixel.
     ///
     /// # Panics
     /// If `radius` or `cells` is 0.

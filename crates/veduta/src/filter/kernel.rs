@@ -32,10 +32,11 @@ impl Kernel {
     /// Nearly a Gaussian of standard deviation 1/2 pixel, truncated at 2 pixels and normalised: Mitsuba's
     /// `gaussian`, and that of PBRT and RenderMan (`exp(-2 x²)`) but for where they end.
     ///
-    /// It is the cubic with B = 5/8 and C = 0, the best of those without lobes below 0. From the Gaussian it differs by
-    /// at most 1.2 % of the peak, and its standard deviation is 0.508. Gaussians at pixel distance do not sum to 1: the sum of
-    /// those of 1/2 pixel goes up and down by 1.4 %, so that a small light would twinkle when it moves. Any
-    /// kernel that keeps the sum differs from them by 0.6 % of the peak at least.
+    /// It is the cubic with B = 5/8 and C = 0, the best of those without lobes below 0. From the
+    /// Gaussian it differs by at most 1.2 % of the peak, and its standard deviation is 0.508. Gaussians
+    /// at pixel distance do not sum to 1: the sum of those of 1/2 pixel goes up and down by 1.4 %, so
+    /// that a small light would twinkle when it moves. Any kernel that keeps the sum differs from them
+    /// by 0.6 % of the peak at least.
     pub fn gaussian() -> Self {
         Self::cubic(5.0 / 8.0, 0.0)
     }
@@ -84,8 +85,9 @@ fn mirrored([a, b, c, d]: [f64; 4]) -> [f64; 4] {
 /// A kernel made ready for the cells of a grid, one or several to a pixel, whose borders go through the
 /// pixels' centres.
 ///
-/// Along each axis a cell lies in the kernels of `N` pixels, twice the radius: the nearest before and after it, here in
-/// ascending order. Their pieces have as many coefficients, so `N` is 2 for the triangle and 4 for cubics.
+/// Along each axis a cell lies in the kernels of `N` pixels, twice the radius: the nearest before and
+/// after it, here in ascending order. Their pieces have as many coefficients, so `N` is 2 for the
+/// triangle and 4 for cubics.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellKernel<const N: usize> {
     /// Of each place of a cell between two pixel centres, by pixel: the piece's coefficients, for integrals

@@ -1,18 +1,18 @@
 //! Pixel filters: how much of what is seen at a point goes to which pixel. Knows no stage.
 //!
 //! A pixel is the integral of radiance times a kernel around its centre. The kernels are *separable*,
-//! `k(x) k(y)`, and polynomials of degree 3 at most between one pixel centre and the next. So on the cells of a grid
-//! whose corners are the pixels' centres the weight of a polygon is a sum over its moments
-//! ([`CellMoments`](veduta_geometry::CellMoments)), without an error and without samples:
+//! `k(x) k(y)`, and polynomials of degree 3 at most between one pixel centre and the next. So on the
+//! cells of a grid whose corners are the pixels' centres the weight of a polygon is a sum over its
+//! moments ([`CellMoments`](veduta_geometry::CellMoments)), without an error and without samples:
 //!
 //! ```text
-//!    .---------.---------.---------.      . centres of pixels
-//!    |         |  _____  |         |
-//!    |         | |     | |         |      Of radius 1, a kernel around the centre P reaches the four cells that
-//!    .---------.-|---P-|-.---------.      meet there; of radius 2, these sixteen. The inner square is
-//!    |         | |_____| |         |      the pixel.
-//!    |         |         |         |
-//!    .---------.---------.---------.
+//!     .-------.-------.-------.      . centres of pixels, at the corners of cells
+//!     |       |       |       |
+//!     |   +---|---+   |       |      P is one of them, and the square around it the pixel.
+//!     .---|---P---|---.-------.      A kernel of radius 1 reaches the four cells that meet
+//!     |   +---|---+   |       |      at P, one of radius 2 these and the twelve around them.
+//!     |       |       |       |
+//!     .-------.-------.-------.
 //! ```
 //!
 //! Kernels sum to 1 over all pixels at any point ([`Kernel`]): no point of the scene counts more than another,

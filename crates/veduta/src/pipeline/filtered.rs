@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use veduta_geometry::CellMoments;
 use veduta_map::VisibilityMap;
 
-/// Cells along the side of a pixel where light differs from point to point. It is evaluated once in each part of
-/// a cell, so that larger cells would blur textures more than the filter does: cells of a pixel as if the kernel's
-/// variance, in square pixels, were larger by 1/6, these by 1/24 (1/12 and 1/48 of it by the look-up's own
-/// footprint). Where all faces have one colour, cells of a pixel are exact.
+/// Cells along the side of a pixel where light differs from point to point. It is evaluated once in
+/// each part of a cell, so that larger cells would blur textures more than the filter does: cells of a
+/// pixel as if the kernel's variance, in square pixels, were larger by 1/6, these by 1/24 (1/12 and
+/// 1/48 of it by the look-up's own footprint). Where all faces have one colour, cells of a pixel are
+/// exact.
 const FINE_CELLS: u32 = 2;
 
 /// What a thread keeps from band to band.
