@@ -9,6 +9,11 @@ use crate::shade::Radiance;
 /// What is diced and shaded are the cells between the pixels' centres ([`PixelGrid::between_centres`]),
 /// on which a kernel is a polynomial. It is exact wherever radiance is constant over a part, as the box
 /// filter is; elsewhere the error goes with the square of the cells' size.
+///
+/// What lies outside the frame is not known. So a pixel that the frame contains is the mean over what
+/// its kernel reaches inside, and a plain scene stays plain up to the frame's border; of a pixel that
+/// the frame contains in part, that mean counts as much as the part, as in the box filter. What lies
+/// outside the grid but in the frame counts as everywhere: a pixel is the same whatever the window.
 #[derive(Clone, Debug)]
 pub struct KernelFilter<const N: usize> {
     kernel: CellKernel<N>,
@@ -158,10 +163,6 @@ impl<const N: usize> KernelFilter<N> {
 }
 
 /// What the sums of pixels are multiplied by where the frame ends, along each axis.
-///
-/// What lies outside the frame is not known. So a pixel that the frame contains is the mean over what
-/// its kernel reaches inside, and a plain scene stays plain up to the frame's border; of a pixel that
-/// the frame contains in part, that mean counts as much as the part, as in the box filter.
 #[derive(Clone, Debug)]
 struct FrameShares {
     columns: Vec<f64>,

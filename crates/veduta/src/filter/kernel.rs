@@ -93,6 +93,8 @@ pub struct CellKernel<const N: usize> {
     /// Of each place of a cell between two pixel centres, by pixel: the piece's coefficients, for integrals
     /// over cells that are to be in pixels.
     pieces: Vec<[[f64; N]; N]>,
+    /// The pieces' integrals over the cell.
+    whole: Vec<[f64; N]>,
 }
 
 impl<const N: usize> CellKernel<N> {
@@ -118,10 +120,17 @@ impl<const N: usize> CellKernel<N> {
         };
         let places = (0..cells_per_pixel).map(|place| f64::from(place) * size);
         // The first pixel is the farthest before the cell, which lies in the last piece of its kernel.
-        let pieces = places
-            .map(|left| std::array::from_fn(|pixel| of_cell(&kernel.pieces[N - 1 - pixel], left)));
+        let pieces: Vec<[[f64; N]; N]> = places
+            .map(|left| std::array::from_fn(|pixel| of_cell(&kernel.pieces[N - 1 - pixel], left)))
+            .collect();
+        let integral = |piece: [f64; N]| -> f64 {
+            let terms = piece.iter().enumerate();
+            terms.map(|(power, c)| c / (power + 1) as f64).sum()
+        };
+        let whole = pieces.iter().map(|of_pixels| of_pixels.map(integral));
         Self {
-            pieces: pieces.collect(),
+            whole: whole.collect(),
+            pieces,
         }
     }
 
@@ -132,11 +141,9 @@ impl<const N: usize> CellKernel<N> {
 
     /// The weights of a whole cell along an axis, in pixels: `cell` counts from one that begins at a pixel's
     /// centre.
+    #[inline]
     pub fn of_whole_cell(&self, cell: u32) -> [f64; N] {
-        self.of_cell(cell).map(|piece| {
-            let terms = piece.iter().enumerate();
-            terms.map(|(power, c)| c / (power + 1) as f64).sum()
-        })
+        self.whole[(cell % self.cells_per_pixel()) as usize]
     }
 
     /// The weights of what has `moments` in a cell, in square pixels: `[row][column]` of the pixels.
