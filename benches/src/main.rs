@@ -7,6 +7,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::ExitCode;
 use veduta::accumulate::Picture;
+use veduta::filter::Filter;
 use veduta::map::VisibilityMap;
 use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
@@ -29,6 +30,7 @@ Tables:
   zbuffer   the exact map, and picture, against a z-buffer with one sample a pixel
   engines   all methods, supersampling included
   stored    stored maps: compositing two and eight, writing, reading, a window of a sixteenth
+  filters   pixels of a map by each filter, and as a ratio to the box filter
 
 Columns: map is the exact map alone, exact the map and its pixels.
 
@@ -50,7 +52,7 @@ struct Measurement {
     row: fn(&Case) -> Vec<String>,
 }
 
-const MEASUREMENTS: [Measurement; 4] = [
+const MEASUREMENTS: [Measurement; 5] = [
     Measurement {
         name: "stored",
         scenes: &[
@@ -76,6 +78,20 @@ const MEASUREMENTS: [Measurement; 4] = [
             "window reads",
         ],
         row: stored,
+    },
+    Measurement {
+        name: "filters",
+        scenes: &["balls7", "bridge@1920x1080", "field1m@1920x1080"],
+        titles: &[
+            "scene, ms",
+            "map",
+            "box",
+            "triangle",
+            "ratio",
+            "mitchell",
+            "ratio",
+        ],
+        row: filters,
     },
     Measurement {
         name: "n-et",
@@ -277,6 +293,33 @@ fn stored(case: &Case) -> Vec<String> {
         (times.bytes / 1000).to_string(),
         format!("{:.0}", times.bytes_per_face),
         format!("{:.3}", times.window),
+    ]
+}
+
+/// From a map to pixels, by filters of radius 1/2, 1 and 2. All cubics take as long as Mitchell's.
+fn filters(case: &Case) -> Vec<String> {
+    let mut map = case.empty_map();
+    case.find_into(&mut map);
+    let picture = |filter| black_box(case.picture_of(&map, filter));
+    let [find, sharp, triangle, mitchell] = least_times(
+        ROUNDS,
+        [
+            &mut || exact_map(case),
+            &mut || drop(picture(Filter::Box)),
+            &mut || drop(picture(Filter::Triangle)),
+            &mut || drop(picture(Filter::Mitchell)),
+        ],
+    )
+    .map(milliseconds);
+    let ratio = |time: f64| format!("{:.1}", time / sharp);
+    vec![
+        case.title(),
+        ms(find),
+        ms(sharp),
+        ms(triangle),
+        ratio(triangle),
+        ms(mitchell),
+        ratio(mitchell),
     ]
 }
 

@@ -76,6 +76,9 @@ impl Composite {
             let message = "a map is of no picture: --aov is not for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
+        if map_place.is_some() {
+            self.look.refuse_filter("a map is of no picture")?;
+        }
         if map_place.is_none() && target.is_none() {
             let message = "a composite is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
@@ -115,9 +118,10 @@ impl Composite {
             tell_shortcomings(&self.maps[0], &seen.scene, &shortcomings, self.strict, talk)?;
             talk.begin("shading");
             let grid = PixelGrid::of_frame(width, height);
-            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
+            let (aovs, filter) = (self.output.aovs(), self.look.filter());
+            let unlit = self.look.unlit;
             let (mut picture, aovs) =
-                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, filter, aovs);
             let layers = Layers {
                 aovs: &aovs,
                 scene: &seen.scene,

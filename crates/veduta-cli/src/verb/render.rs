@@ -137,6 +137,11 @@ impl Render {
         }
         let target = self.output.target(&self.model, json)?;
         let deep_target = self.deep_target(&target)?;
+        if self.sampling != Sampling::Exact {
+            self.look.refuse_filter(
+                "filters weigh exact regions, which --sampling multiscan does not find",
+            )?;
+        }
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
@@ -169,6 +174,7 @@ impl Render {
             height,
             sampling: self.sampling,
             unlit: self.look.unlit,
+            filter: self.look.filter(),
             aovs: self.output.aovs(),
         };
         let Rendered {
@@ -237,6 +243,8 @@ impl Render {
                     let message = "--deep needs exact areas; leave --sampling out";
                     return Err(Failure::new(Code::Usage, message));
                 }
+                let why = "a deep picture keeps what is seen in each pixel alone";
+                self.look.refuse_filter(why)?;
                 self.output.deep_target(target).map(Some)
             }
             _ => Ok(None),
@@ -289,6 +297,7 @@ impl Render {
             let message = "a vector picture is made of exact regions; leave --sampling out";
             return Err(Failure::new(Code::Usage, message));
         }
+        self.look.refuse_filter("a vector picture has no pixels")?;
         let settings = self.vector.drawing(target.format)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
@@ -331,6 +340,7 @@ impl Render {
                 for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
+        self.look.refuse_filter("a map is of no picture")?;
         let source = source_of(&self.model)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;

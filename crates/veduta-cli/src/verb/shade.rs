@@ -69,6 +69,7 @@ impl Shade {
         }
         let vector = match self.output.vector_target(&self.map, json)? {
             Some(target) => {
+                self.look.refuse_filter("a vector picture has no pixels")?;
                 let settings = self.vector.drawing(target.format)?;
                 if settings.lines.contains(&LineKind::Boundary) {
                     let message = "a map holds the faces that are seen, so that it cannot tell which \
@@ -115,8 +116,14 @@ impl Shade {
             pixels_per_frame: frame,
             origin: left_top,
         };
-        let corner = DVec2::new(size.width.into(), size.height.into());
-        let shown = [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels));
+        let filter = self.look.filter();
+        // A filter looks beyond the window.
+        let reached = match filter.kernel() {
+            Some(kernel) => grid.between_centres(kernel.radius(), 1),
+            None => grid,
+        };
+        let corner = DVec2::new(reached.width.into(), reached.height.into());
+        let shown = [DVec2::ZERO, corner].map(|pixels| reached.image_from_pixels(pixels));
         let mut seen = map.read(|reader| reader.read_window(shown))?;
         let bytes_read = map.reader().bytes_read();
         self.changes.apply(&mut seen.scene, self.strict, talk)?;
@@ -138,7 +145,7 @@ impl Shade {
             tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
             let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
             let (mut picture, aovs) =
-                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, filter, aovs);
             let layers = Layers {
                 aovs: &aovs,
                 scene: &seen.scene,
