@@ -86,9 +86,9 @@ impl Pieces {
     }
 
     /// Adds a piece found before.
-    pub fn add(&mut self, corners: &[Corner]) {
+    pub fn add(&mut self, corners: impl Iterator<Item = Corner>) {
         let start = self.arena.len();
-        self.arena.extend_from_slice(corners);
+        self.arena.extend(corners);
         self.pieces.extend(Piece::from(&self.arena, start));
     }
 
