@@ -60,6 +60,13 @@ impl Row {
     }
 }
 
+/// Faces for each cell: more than when visibility is found, since most have been hidden already, and a
+/// cell is looked at again for each face in it.
+const FACES_PER_CELL: usize = 16;
+
+/// Cells at least: with fewer, maps would seem to meet where they only come near.
+const FEWEST_CELLS: usize = 64;
+
 /// Faces a task looks at at a time.
 const FACES_PER_TASK: usize = 8192;
 
@@ -69,7 +76,8 @@ impl<'a> Meeting<'a> {
         let mut rows = rows(faces, maps);
         let seen = rows.iter().filter(|row| row.is_seen()).count();
         let extents = Extent::of_all(faces);
-        let grid = Grid::choose(seen, aspect, [0.0, 1.0], None);
+        let cells = (seen / FACES_PER_CELL).clamp(FEWEST_CELLS, 1 << 20) as u32;
+        let grid = Grid::choose(seen, aspect, [0.0, 1.0], Some(cells));
         let meets = cells_of_several(faces, &rows, &extents, &grid);
         let tasks = rows.par_chunks_mut(FACES_PER_TASK).enumerate();
         tasks.for_each(|(task, rows)| {
