@@ -365,3 +365,33 @@ impl Mesh {
         selected
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veduta_geometry::DVec2;
+
+    #[test]
+    fn renumbered_fragments_stand_in_the_order_of_their_new_faces() {
+        let corner = |k: u32, face: u32| {
+            let point = DVec2::new(f64::from(k), f64::from(face));
+            (point, Side::crossing(FaceId(face)))
+        };
+        let cut = |face: u32| (0..3).map(move |k| corner(k, face));
+        let mut fragments = Fragments::new();
+        fragments.push_cut(FaceId(0), cut(2).collect::<Vec<_>>().into_iter());
+        fragments.push_cut(FaceId(0), cut(1).collect::<Vec<_>>().into_iter());
+        fragments.push_whole(FaceId(1));
+        let found = fragments.renumbered(|face| FaceId(9 - face.0));
+        let mut expected = Fragments::new();
+        expected.push_whole(FaceId(8));
+        for face in [2, 1] {
+            let corners = cut(face).map(|(point, _)| (point, Side::crossing(FaceId(9 - face))));
+            expected.push_cut(FaceId(9), corners.collect::<Vec<_>>().into_iter());
+        }
+        assert_eq!(found, expected);
+        // Numbers that only close gaps keep the order.
+        let same = fragments.renumbered(|face| face);
+        assert_eq!(same, fragments);
+    }
+}

@@ -230,3 +230,37 @@ fn cells_of_several(faces: &Faces, rows: &[Row], extents: &[Extent], grid: &Grid
     let owners = owners.into_iter().map(AtomicU32::into_inner);
     owners.map(|owner| owner == SEVERAL).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veduta_geometry::{Affine, DVec2};
+    use veduta_map::{ObjectId, Side};
+
+    #[test]
+    fn where_maps_do_not_meet_fragments_stay_bit_for_bit() {
+        let mut faces = Faces::new();
+        let plane = faces.push_plane(Affine::new(0.0, 0.0, 1.0));
+        let triangle = [[0.1, 0.1], [0.3, 0.1], [0.1, 0.3]].map(DVec2::from);
+        let maps: Vec<Seen> = [0.0, 0.6]
+            .iter()
+            .map(|&by| {
+                let outline = triangle.map(|corner| corner + by);
+                let face = faces
+                    .push(&outline, plane, ObjectId(0), 0)
+                    .expect("has an area");
+                let mut seen = Seen::default();
+                let sides = [0, 1, 2].map(|index| Side::of_outline(face, index));
+                let half = [outline[0], outline[1], 0.5 * (outline[1] + outline[2])];
+                seen.opaque.push_cut(face, half.into_iter().zip(sides));
+                seen
+            })
+            .collect();
+        let merged = merge(&faces, &maps, 1.0);
+        assert_eq!(merged.opaque.get(0), maps[0].opaque.get(0));
+        assert_eq!(merged.opaque.get(1), maps[1].opaque.get(0));
+        assert_eq!(merged.opaque.len(), 2);
+        let meeting = Meeting::of(&faces, &maps, 1.0);
+        assert_eq!(meeting.faces(), []);
+    }
+}

@@ -568,6 +568,36 @@ mod tests {
     }
 
     #[test]
+    fn among_maps_only_faces_of_different_ones_are_compared() {
+        let scene = scene(&[(2, tilted(0.0)), (3, tilted(0.0)), (2, tilted(1.0))]);
+        let objects = scene.objects.iter();
+        let meshes: Vec<(&Mesh, DMat4)> = objects
+            .map(|object| {
+                (
+                    &scene.meshes[object.mesh.0 as usize],
+                    object.world_from_object,
+                )
+            })
+            .collect();
+        let pairs_of = |map: fn(u32) -> u32| {
+            let faces: Vec<(FaceIndex, u32)> = (0..3)
+                .flat_map(|object| {
+                    let count = meshes[object as usize].0.face_count() as u32;
+                    (0..count).map(move |face| ((object, face), map(object)))
+                })
+                .collect();
+            PlaneGroups::among_maps(&meshes, &faces).pairs().to_vec()
+        };
+        assert_eq!(pairs_of(|_| 7), [], "of one map");
+        assert_eq!(pairs_of(|object| object % 2).len(), 8 + 18);
+        assert!(
+            pairs_of(|object| object)
+                .iter()
+                .all(|pair| pair.1 == (0, 0))
+        );
+    }
+
+    #[test]
     fn a_polygon_shares_its_plane_with_triangles_that_lie_in_it() {
         let mut scene = scene(&[(1, tilted(0.0)), (2, tilted(0.0))]);
         let mesh = &mut scene.meshes[0];
