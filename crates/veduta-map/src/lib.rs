@@ -23,5 +23,5 @@ pub use fragments::{Fragment, Fragments, Seen, Side};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
 pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};
-pub use stored::SeenScene;
+pub use stored::{ObjectMesh, SeenScene};
 pub use veduta_geometry::Affine;

@@ -1,11 +1,13 @@
-use super::merge;
-use crate::scene::PlaneGroups;
+use super::merge::Meeting;
+use crate::scene::{FaceIndex, PlaneGroups};
 use std::cmp::Reverse;
+use std::ops::Range;
+use veduta_geometry::DMat4;
 use veduta_map::scene::{
     Image, ImageId, Layer, Material, Mesh, MeshId, Object, ObjectKey, Scene, World,
 };
 use veduta_map::{
-    Affine, Camera, FaceId, Faces, MaterialId, ObjectId, PlaneId, Projection, Seen, SeenScene,
+    Camera, FaceId, Faces, ObjectId, ObjectMesh, PlaneId, Projection, Seen, SeenScene,
     VisibilityMap,
 };
 
@@ -62,8 +64,7 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
         }
     }
     let united = UnitedScenes::of(&maps);
-    let groups = PlaneGroups::of(&united.scene);
-    let (faces, new_ids) = united.faces(&maps, &groups);
+    let (mut faces, new_ids) = united.faces(&maps);
     let seen: Vec<Seen> = maps
         .iter()
         .zip(&new_ids)
@@ -81,20 +82,33 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
         near: nears.fold(f64::INFINITY, f64::min),
         ..first.map.camera
     };
-    let mut is_shown = vec![false; faces.len()];
-    for face in new_ids[..shown].iter().flatten() {
-        is_shown[face.index()] = true;
+    let mut meeting = Meeting::of(&faces, &seen, camera.aspect());
+    united.share_planes(&mut faces, &mut meeting);
+    let Seen {
+        mut opaque,
+        mut veils,
+    } = meeting.merge(&faces);
+    if shown < maps.len() {
+        let mut is_shown = vec![false; faces.len()];
+        for face in new_ids[..shown].iter().flatten() {
+            is_shown[face.index()] = true;
+        }
+        for fragments in [&mut opaque, &mut veils] {
+            *fragments = fragments.selected(|face| is_shown[face.index()]);
+        }
     }
-    let Seen { opaque, veils } = merge(&faces, &seen, camera.aspect());
-    let [opaque, veils] =
-        [opaque, veils].map(|fragments| fragments.selected(|face| is_shown[face.index()]));
     let map = VisibilityMap {
         camera,
         faces,
         opaque,
         veils,
     };
-    Ok(SeenScene::of(&united.scene, &map, first.size))
+    Ok(SeenScene::of_meshes(
+        &united.scene,
+        &united.meshes,
+        &map,
+        first.size,
+    ))
 }
 
 /// In what two cameras differ, in words for the user. Near planes may: nearness does not depend on them.
@@ -163,14 +177,17 @@ fn world_difference(one: &World, other: &World) -> Option<String> {
 }
 
 /// The scenes of several maps as one.
-struct UnitedScenes {
+struct UnitedScenes<'a> {
+    /// Without meshes.
     scene: Scene,
+    /// Those of its objects.
+    meshes: Vec<ObjectMesh<'a>>,
     /// Of each map, the new numbers of its objects.
     objects: Vec<Vec<ObjectId>>,
 }
 
-impl UnitedScenes {
-    fn of(maps: &[&SeenScene]) -> Self {
+impl<'a> UnitedScenes<'a> {
+    fn of(maps: &[&'a SeenScene]) -> Self {
         let mut scene = Scene {
             world: maps
                 .iter()
@@ -191,14 +208,19 @@ impl UnitedScenes {
             .iter()
             .map(|seen| vec![ObjectId(0); seen.scene.objects.len()])
             .collect();
-        let mut meshes: Vec<&Mesh> = Vec::new();
-        let mut of_map: Vec<usize> = Vec::new();
+        let first_material: Vec<u32> = maps
+            .iter()
+            .map(|seen| add_materials(&mut scene, &seen.scene.materials, &seen.scene.images))
+            .collect();
+        let mut meshes: Vec<ObjectMesh> = Vec::with_capacity(order.len());
         for &((Reverse(priority), layer, _), map, object) in &order {
             let id = ObjectId::from_index(scene.objects.len());
             objects[map][object.index()] = id;
             let from = &maps[map].scene;
-            meshes.push(from.mesh_of(object));
-            of_map.push(map);
+            meshes.push(ObjectMesh {
+                mesh: from.mesh_of(object),
+                first_material: first_material[map],
+            });
             scene.objects.push(Object {
                 mesh: MeshId(id.0),
                 ..from.object(object).clone()
@@ -216,17 +238,6 @@ impl UnitedScenes {
                 }
             }
         }
-        let first_material: Vec<u32> = maps
-            .iter()
-            .map(|seen| add_materials(&mut scene, &seen.scene.materials, &seen.scene.images))
-            .collect();
-        for (mesh, map) in meshes.into_iter().zip(of_map) {
-            let mut mesh = mesh.clone();
-            for (_, material) in &mut mesh.materials {
-                *material = MaterialId(material.0 + first_material[map]);
-            }
-            scene.meshes.push(mesh);
-        }
         for seen in maps {
             for light in &seen.scene.lights {
                 if !scene.lights.contains(light) {
@@ -234,20 +245,31 @@ impl UnitedScenes {
                 }
             }
         }
-        Self { scene, objects }
+        Self {
+            scene,
+            meshes,
+            objects,
+        }
     }
 
     /// The faces of all maps as one table in the order of the objects, and of each map the new numbers
-    /// of its faces. Faces of one plane share it.
-    fn faces(&self, maps: &[&SeenScene], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
-        let mut order: Vec<(ObjectId, FaceId, usize)> = Vec::new();
+    /// of its faces.
+    fn faces(&self, maps: &[&SeenScene]) -> (Faces, Vec<Vec<FaceId>>) {
+        // Faces of an object follow one another in its map.
+        let mut runs: Vec<(ObjectId, usize, Range<u32>)> = Vec::new();
         for (map, seen) in maps.iter().enumerate() {
             let table = &seen.map.faces;
-            let object = |face: FaceId| self.objects[map][table.object(face).index()];
-            order.extend(table.ids().map(|face| (object(face), face, map)));
+            for face in table.ids() {
+                let object = self.objects[map][table.object(face).index()];
+                match runs.last_mut() {
+                    Some(run) if run.0 == object && run.1 == map => run.2.end += 1,
+                    _ => runs.push((object, map, face.0..face.0 + 1)),
+                }
+            }
         }
-        order.sort_unstable();
-        let mut faces = Faces::with_capacity(order.len());
+        runs.sort_by_key(|run| run.0);
+        let count = maps.iter().map(|seen| seen.map.faces.len()).sum();
+        let mut faces = Faces::with_capacity(count);
         let mut new_ids: Vec<Vec<FaceId>> = maps
             .iter()
             .map(|seen| vec![FaceId(0); seen.map.faces.len()])
@@ -255,23 +277,45 @@ impl UnitedScenes {
         let mut first_plane = Vec::with_capacity(maps.len());
         for seen in maps {
             first_plane.push(faces.planes().len() as u32);
-            let planes: &[Affine] = seen.map.faces.planes();
-            planes.iter().for_each(|&plane| {
+            for &plane in seen.map.faces.planes() {
                 faces.push_plane(plane);
-            });
-        }
-        for (object, face, map) in order {
-            let table = &maps[map].map.faces;
-            let plane = PlaneId(table.plane(face).0 + first_plane[map]);
-            let id = faces.push(table.outline(face), plane, object, table.source(face));
-            let id = id.expect("a face of a table has an area");
-            if table.is_veil(face) {
-                faces.set_veil(id);
             }
-            new_ids[map][face.index()] = id;
         }
-        groups.share_planes(&mut faces);
+        for (object, map, run) in runs {
+            let table = &maps[map].map.faces;
+            for face in run.map(FaceId) {
+                let plane = PlaneId(table.plane(face).0 + first_plane[map]);
+                let source = table.source(face);
+                new_ids[map][face.index()] = faces.push_row(table, face, plane, object, source);
+            }
+        }
         (faces, new_ids)
+    }
+
+    /// Gives faces of different maps that meet in one plane that plane.
+    fn share_planes(&self, faces: &mut Faces, meeting: &mut Meeting) {
+        let objects = self.scene.objects.iter();
+        let placed: Vec<(&Mesh, DMat4)> = objects
+            .zip(&self.meshes)
+            .map(|(object, of)| (of.mesh, object.world_from_object))
+            .collect();
+        let index_of = |faces: &Faces, face: FaceId| (faces.object(face).0, faces.source(face));
+        let candidates: Vec<(FaceId, (FaceIndex, u32))> = meeting
+            .faces()
+            .into_iter()
+            .map(|(face, map)| (face, (index_of(faces, face), map)))
+            .collect();
+        let indices: Vec<(FaceIndex, u32)> = candidates.iter().map(|pair| pair.1).collect();
+        let groups = PlaneGroups::among_maps(&placed, &indices);
+        let id_of = |index: FaceIndex| {
+            let row = candidates.partition_point(|&(_, (other, _))| other < index);
+            candidates[row].0
+        };
+        for &(face, first) in groups.pairs() {
+            let face = id_of(face);
+            faces.share_plane(face, id_of(first));
+            meeting.plane_changed(faces, face);
+        }
     }
 }
 
