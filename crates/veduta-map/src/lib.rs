@@ -27,5 +27,5 @@ pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
 pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};
 pub use spans::{SeenSpans, Span, SpanBand, Spans, TooFewSubScanlines};
-pub use stored::SeenScene;
+pub use stored::{ObjectMesh, SeenScene};
 pub use veduta_geometry::Affine;

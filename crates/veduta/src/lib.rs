@@ -13,6 +13,7 @@ mod clip;
 pub mod composite;
 pub mod dice;
 pub mod drawing;
+pub mod filter;
 pub mod pipeline;
 pub mod scene;
 pub mod shade;

@@ -1,14 +1,17 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
-//! the light and `pipeline/deep.rs` for deep pictures.
+//! the light, `pipeline/deep.rs` for deep pictures and `pipeline/filtered.rs` for filters that reach beyond
+//! the pixel.
 
 mod aovs;
 mod deep;
+mod filtered;
 
 pub use deep::{deep_window, render_deep};
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer, VeilBuffers};
 use crate::drawing::{self, Drawing, Evenness, Look};
+use crate::filter::Filter;
 use crate::scene::{Opacities, Opacity, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
@@ -33,18 +36,22 @@ pub struct RenderSettings {
     pub sampling: Sampling,
     /// Materials show their colour as it is, without light.
     pub unlit: bool,
+    /// How what is seen around a pixel's centre is weighed. Channels beside the light and deep pictures are
+    /// those of pixels, whatever the filter.
+    pub filter: Filter,
     /// Channels that are made beside the light.
     pub aovs: AovSettings,
 }
 
 impl Default for RenderSettings {
-    /// 1280 x 720, exact, lit, light alone.
+    /// 1280 x 720, exact, lit, by area, light alone.
     fn default() -> Self {
         Self {
             width: 1280,
             height: 720,
             sampling: Sampling::Exact,
             unlit: false,
+            filter: Filter::Box,
             aovs: AovSettings::default(),
         }
     }
@@ -130,7 +137,8 @@ fn map_of(camera: &Camera, faces: Faces, strip: [f64; 2]) -> VisibilityMap {
 /// Whether or not changes nothing that can be seen: areas are exact either way.
 ///
 /// # Panics
-/// If the size is 0, or the picture is too large for the machine's memory.
+/// If the size is 0, the picture is too large for the machine's memory, or `settings` ask for another filter
+/// than the box with [`Sampling::Multiscan`]: spans have no regions to weigh.
 pub fn render(
     scene: &Scene,
     camera: &Camera,
@@ -141,6 +149,10 @@ pub fn render(
     begin(Step::Projecting);
     let faces = visibility::project(scene, camera);
     if let Sampling::Multiscan(n) = settings.sampling {
+        assert!(
+            settings.filter == Filter::Box,
+            "what multiscan finds is summed by area"
+        );
         begin(Step::FindingVisibility);
         let spans = multiscan::find_spans(&faces, grid.width, grid.height, n);
         begin(Step::Shading);
@@ -159,7 +171,13 @@ pub fn render(
     begin(Step::FindingVisibility);
     let map = map_of(camera, faces, [0.0, 1.0]);
     begin(Step::Shading);
-    let (picture, aovs) = render_channels(scene, &map, &grid, settings.unlit, settings.aovs);
+    let RenderSettings {
+        unlit,
+        filter,
+        aovs,
+        ..
+    } = *settings;
+    let (picture, aovs) = render_channels(scene, &map, &grid, unlit, filter, aovs);
     Rendered {
         picture,
         aovs,
@@ -178,18 +196,21 @@ pub fn render_map(scene: &Scene, map: &VisibilityMap, settings: &RenderSettings)
         "the pixels of a map are found exactly"
     );
     let grid = PixelGrid::of_frame(settings.width, settings.height);
-    render_window(scene, map, &grid, settings.unlit)
+    let (unlit, filter, aovs) = (settings.unlit, settings.filter, AovSettings::default());
+    render_channels(scene, map, &grid, unlit, filter, aovs).0
 }
 
-/// Makes the picture of a map of `scene` on any grid of pixels: scaled, or a window of it.
+/// Makes the picture of a map of `scene` on any grid of pixels: scaled, or a window of it. By area.
 ///
 /// # Panics
 /// If the picture is too large for the machine's memory.
 pub fn render_window(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Picture {
-    render_channels(scene, map, grid, unlit, AovSettings::default()).0
+    render_channels(scene, map, grid, unlit, Filter::Box, AovSettings::default()).0
 }
 
-/// [`render_window`] with channels beside the light.
+/// [`render_window`] by any filter, with channels beside the light.
+///
+/// A pixel does not depend on the window: filters look at what the map has outside the grid.
 ///
 /// # Panics
 /// If the picture is too large for the machine's memory.
@@ -198,10 +219,11 @@ pub fn render_channels(
     map: &VisibilityMap,
     grid: &PixelGrid,
     unlit: bool,
+    filter: Filter,
     aovs: AovSettings,
 ) -> (Picture, Aovs) {
     let textures = Textures::new(scene, &materials_seen(scene, map));
-    let mut canvas = Canvas::new(grid, aovs);
+    let mut canvas = Canvas::new(grid, filter, aovs);
     canvas.paint_map(scene, &textures, map, grid, unlit, 0);
     (canvas.picture, canvas.aovs)
 }
@@ -210,12 +232,13 @@ pub fn render_channels(
 struct Canvas {
     picture: Picture,
     aovs: Aovs,
+    filter: Filter,
     settings: AovSettings,
 }
 
 impl Canvas {
     /// Nothing yet of a picture of the size of `grid`.
-    fn new(grid: &PixelGrid, settings: AovSettings) -> Self {
+    fn new(grid: &PixelGrid, filter: Filter, settings: AovSettings) -> Self {
         Self {
             picture: Picture {
                 width: grid.width,
@@ -223,6 +246,7 @@ impl Canvas {
                 pixels: vec![[0.0; 4]; grid.pixel_count()],
             },
             aovs: Aovs::new(&settings, grid.pixel_count()),
+            filter,
             settings,
         }
     }
@@ -250,8 +274,20 @@ impl Canvas {
             let BandBuffers { dicer, parts, .. } = buffers;
             dice::dice(map, &bands, band, varies, dicer, parts);
         };
-        let veiled = (!map.veils.is_empty()).then_some(map);
-        self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
+        let kernel = self.filter.kernel();
+        // Channels are those of pixels, and made with the light by area, which a kernel's replaces.
+        if kernel.is_none() || maker.is_some() {
+            let veiled = (!map.veils.is_empty()).then_some(map);
+            self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
+        }
+        if let Some(kernel) = &kernel {
+            let first = first_row * grid.width as usize;
+            let light = &mut self.picture.pixels[first..first + grid.pixel_count()];
+            match kernel.radius() {
+                1 => filtered::paint::<2>(&surfaces, kernel, map, grid, light),
+                _ => filtered::paint::<4>(&surfaces, kernel, map, grid, light),
+            }
+        }
     }
 
     /// What makes the channels beside the light, if there are any.
@@ -440,7 +476,7 @@ fn paint_spans(
     let light = Daylight::default();
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
-    let mut canvas = Canvas::new(grid, aovs);
+    let mut canvas = Canvas::new(grid, Filter::Box, aovs);
     let maker = canvas.maker(scene, &textures, camera, faces, &shown);
     let dice = |band: usize, buffers: &mut BandBuffers| {
         let first = band as u32 * BAND_ROWS;
@@ -469,12 +505,18 @@ fn render_strips(
     let height = frame.height as usize;
     let count = strips.clamp(1, height);
     let rows: Vec<usize> = (0..=count).map(|strip| strip * height / count).collect();
-    let border = |&row: &usize| row as f64 / height as f64;
-    let strips = Strips::new(faces, rows.iter().map(border).collect());
+    // Filters look at what lies above and below a strip.
+    let kernel = settings.filter.kernel();
+    let reach = kernel.map_or(0.0, |kernel| f64::from(kernel.radius()) - 0.5);
+    let at = |row: f64| row.clamp(0.0, height as f64) / height as f64;
+    let extents = rows
+        .windows(2)
+        .map(|rows| [at(rows[0] as f64 - reach), at(rows[1] as f64 + reach)]);
+    let strips = Strips::new(faces, extents.collect());
     let in_view = faces.ids().map(|face| material_of(scene, faces, face));
     let textures = Textures::new(scene, &in_view.collect());
 
-    let mut canvas = Canvas::new(&frame, settings.aovs);
+    let mut canvas = Canvas::new(&frame, settings.filter, settings.aovs);
     for strip in 0..count {
         begin(Step::Strip {
             index: strip,
@@ -987,7 +1029,7 @@ mod tests {
     #[test]
     fn a_picture_made_in_strips_is_the_maps() {
         let leaves = crate::scene::generate::by_name("leaves20").expect("a scene");
-        let settings = RenderSettings {
+        let mut settings = RenderSettings {
             width: 120,
             height: 77,
             ..RenderSettings::default()
@@ -996,15 +1038,19 @@ mod tests {
         let faces = visibility::project(scene, camera);
         assert!(faces.len() > 120 * 77, "a crowded picture");
         let map = find_visibility(scene, camera);
-        let expected = render_map(scene, &map, &settings);
-        for strips in [1, 3, 200] {
-            let found = render_strips(scene, camera, &faces, strips, &settings, |_| {});
-            for (a, b) in found.picture.pixels.iter().zip(&expected.pixels) {
-                for (a, b) in a.iter().zip(b) {
-                    assert!((a - b).abs() < 1e-5, "{strips} strips: {a} and {b}");
+        for filter in [Filter::Box, Filter::Triangle, Filter::Mitchell] {
+            settings.filter = filter;
+            let expected = render_map(scene, &map, &settings);
+            for strips in [1, 3, 200] {
+                let found = render_strips(scene, camera, &faces, strips, &settings, |_| {});
+                for (a, b) in found.picture.pixels.iter().zip(&expected.pixels) {
+                    for (a, b) in a.iter().zip(b) {
+                        let wrong = (a - b).abs();
+                        assert!(wrong < 1e-5, "{filter:?}, {strips} strips: {a} and {b}");
+                    }
                 }
+                assert_eq!(found.shortcomings, shortcomings(scene, &map));
             }
-            assert_eq!(found.shortcomings, shortcomings(scene, &map));
         }
         let mut steps = Vec::new();
         render(scene, camera, &settings, |step| steps.push(step));

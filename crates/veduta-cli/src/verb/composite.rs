@@ -73,6 +73,9 @@ impl Composite {
             let message = "a map is of no picture: --aov is not for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
+        if map_place.is_some() {
+            self.look.refuse_filter("a map is of no picture")?;
+        }
         if map_place.is_none() && target.is_none() {
             let message = "a composite is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
@@ -116,8 +119,13 @@ impl Composite {
             )?;
             talk.begin("shading");
             let grid = PixelGrid::of_frame(width, height);
+            let (aovs, filter) = (self.output.aovs(), self.look.filter());
+            if matches!(seen, Stored::Spans(_)) {
+                self.look
+                    .refuse_filter("filters weigh exact regions, not spans")?;
+            }
             let (mut picture, aovs) = seen
-                .picture(&grid, self.look.unlit, self.output.aovs())
+                .picture(&grid, self.look.unlit, filter, aovs)
                 .expect("a picture in its own size needs no more sub-scanlines");
             let layers = Layers {
                 aovs: &aovs,

@@ -146,6 +146,11 @@ impl Render {
         self.refuse_self_contained()?;
         let target = self.output.target(&self.model, json)?;
         let deep_target = self.deep_target(&target)?;
+        if self.sampling != Sampling::Exact {
+            self.look.refuse_filter(
+                "filters weigh exact regions, which --sampling multiscan does not find",
+            )?;
+        }
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
@@ -178,6 +183,7 @@ impl Render {
             height,
             sampling: self.sampling,
             unlit: self.look.unlit,
+            filter: self.look.filter(),
             aovs: self.output.aovs(),
         };
         let Rendered {
@@ -246,6 +252,8 @@ impl Render {
                     let message = "--deep needs exact areas; leave --sampling out";
                     return Err(Failure::new(Code::Usage, message));
                 }
+                let why = "a deep picture keeps what is seen in each pixel alone";
+                self.look.refuse_filter(why)?;
                 self.output.deep_target(target).map(Some)
             }
             _ => Ok(None),
@@ -302,6 +310,7 @@ impl Render {
             let message = "a vector picture is made of exact regions; leave --sampling out";
             return Err(Failure::new(Code::Usage, message));
         }
+        self.look.refuse_filter("a vector picture has no pixels")?;
         let settings = self.vector.drawing(target.format)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
@@ -342,6 +351,7 @@ impl Render {
             let message = "a map is of no picture: --preview, --aov and --deep are not for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
+        self.look.refuse_filter("a map is of no picture")?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
         let mut scene = loaded.scene;

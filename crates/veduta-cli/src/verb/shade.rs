@@ -80,6 +80,7 @@ impl Shade {
         }
         let vector = match self.output.vector_target(&self.map, json)? {
             Some(target) => {
+                self.look.refuse_filter("a vector picture has no pixels")?;
                 let settings = self.vector.drawing(target.format)?;
                 if settings.lines.contains(&LineKind::Boundary) {
                     let message = "a map holds the faces that are seen, so that it cannot tell which \
@@ -98,7 +99,11 @@ impl Shade {
             None => self.output.target(&self.map, json)?,
         };
         let deep = match &pixels {
-            Some(target) if self.deep => Some(self.output.deep_target(target)?),
+            Some(target) if self.deep => {
+                let why = "a deep picture keeps what is seen in each pixel alone";
+                self.look.refuse_filter(why)?;
+                Some(self.output.deep_target(target)?)
+            }
             _ => None,
         };
         if vector.is_none() && pixels.is_none() {
@@ -116,10 +121,17 @@ impl Shade {
             let [width, height] = [grid.width, grid.height];
             target.refuse_size(Size { width, height })?;
         }
-        let corner = DVec2::new(grid.width.into(), grid.height.into());
-        let shown = [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels));
+        // A filter looks beyond the window.
+        let reached = match self.look.filter().kernel() {
+            Some(kernel) => grid.between_centres(kernel.radius(), 1),
+            None => grid,
+        };
+        let window = |grid: &PixelGrid| {
+            let corner = DVec2::new(grid.width.into(), grid.height.into());
+            [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels))
+        };
         let mut seen = match map.reader().sub_scanlines_per_row() {
-            None => Stored::Regions(map.read(|reader| reader.read_window(shown))?),
+            None => Stored::Regions(map.read(|reader| reader.read_window(window(&reached)))?),
             Some(_) if vector.is_some() || self.deep => {
                 let message = format!(
                     "{}: holds spans on sub-scanlines; vector and deep pictures are made of regions, \
@@ -150,7 +162,7 @@ impl Shade {
                 let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
                 tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
                 talk.begin("shading");
-                let camera = seen.map.camera.with_window(shown);
+                let camera = seen.map.camera.with_window(window(&grid));
                 let size = [grid.width, grid.height];
                 let unlit = self.look.unlit;
                 let (samples, ()) = target.write(&seen.scene, camera, size, |sink| {
@@ -210,7 +222,12 @@ impl Shade {
         talk.begin("shading");
         let shortcomings = seen.shortcomings();
         tell_shortcomings(&self.map, scene, &shortcomings, self.strict, talk)?;
-        let picture = seen.picture(grid, self.look.unlit, self.output.aovs());
+        if matches!(seen, Stored::Spans(_)) {
+            self.look
+                .refuse_filter("filters weigh exact regions, not spans")?;
+        }
+        let (aovs, filter) = (self.output.aovs(), self.look.filter());
+        let picture = seen.picture(grid, self.look.unlit, filter, aovs);
         let (mut picture, aovs) = picture.map_err(|error| {
             let message = format!("{}: {error}", self.map.display());
             Failure::new(Code::Usage, message)

@@ -8,6 +8,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use veduta::accumulate::{AovSettings, Aovs, Picture};
 use veduta::dice::PixelGrid;
+use veduta::filter::Filter;
 use veduta::map::{Camera, Faces, Origin, SeenScene, SeenSpans, TooFewSubScanlines};
 use veduta::pipeline::{self, Shortcoming};
 use veduta::scene::Scene;
@@ -164,17 +165,20 @@ impl Stored {
         }
     }
 
-    /// The picture of it, and the channels beside the light.
+    /// The picture of it, and the channels beside the light. Spans have no other filter than the box.
     pub fn picture(
         &self,
         grid: &PixelGrid,
         unlit: bool,
+        filter: Filter,
         aovs: AovSettings,
     ) -> Result<(Picture, Aovs), TooFewSubScanlines> {
         match self {
             Self::Regions(seen) => {
                 let (scene, map) = (&seen.scene, &seen.map);
-                Ok(pipeline::render_channels(scene, map, grid, unlit, aovs))
+                Ok(pipeline::render_channels(
+                    scene, map, grid, unlit, filter, aovs,
+                ))
             }
             Self::Spans(seen) => pipeline::render_spans(seen, grid, unlit, aovs),
         }

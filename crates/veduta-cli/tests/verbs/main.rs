@@ -6,6 +6,7 @@ mod deep;
 mod diff;
 mod endings;
 mod examples;
+mod filters;
 mod help;
 mod info;
 mod pictures;

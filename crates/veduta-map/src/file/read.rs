@@ -41,9 +41,7 @@ impl<R: Read + Seek> MapReader<R> {
                 format!("no {MANIFEST} is in it"),
             ));
         };
-        archive.check(&member)?;
-        let bytes = archive.bytes(MANIFEST, member.start(), member.length)?;
-        let manifest = Manifest::parse(&bytes)?;
+        let manifest = Manifest::parse(&archive.checked_bytes(&member)?)?;
         let reader = Self { archive, manifest };
         reader.check_manifest()?;
         Ok(reader)

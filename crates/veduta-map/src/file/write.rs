@@ -10,14 +10,18 @@ use super::tiles::tiles;
 use crate::scene::Scene;
 use crate::{Origin, SeenScene, SeenSpans, Spans, VisibilityMap};
 use arrow_array::RecordBatch;
-use arrow_ipc::CompressionType;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
+use arrow_ipc::{CompressionType, MetadataVersion};
 use arrow_schema::Schema;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 /// Objects of a batch.
 const OBJECTS_PER_BATCH: usize = 4096;
+
+/// Columns begin at multiples of this in a batch, the least that Arrow allows: they are unpacked into
+/// memory of their own, and its default of 64 would be a tenth of a tile.
+const ALIGNMENT: usize = 8;
 
 /// Writes `seen` to `out`, from its byte 0 on, and what `origin` tells of it.
 ///
@@ -137,8 +141,8 @@ impl<W: Write + Seek> TableWriter<W> {
         batches: &mut dyn Iterator<Item = RecordBatch>,
     ) -> Result<(), FileError> {
         let io = FileError::io(member);
-        let options =
-            IpcWriteOptions::default().try_with_compression(Some(CompressionType::ZSTD))?;
+        let options = IpcWriteOptions::try_new(ALIGNMENT, false, MetadataVersion::V5)?
+            .try_with_compression(Some(CompressionType::ZSTD))?;
         self.archive.begin(member).map_err(&io)?;
         // Arrow's writer fills a buffer that is emptied after each batch.
         let mut writer = FileWriter::try_new_with_options(Vec::new(), schema, options)?;

@@ -40,7 +40,9 @@ pub fn composite_spans(pictures: &[SeenSpans]) -> Result<SeenSpans, CompositeErr
     let scenes: Vec<&Scene> = pictures.iter().map(|seen| &seen.scene).collect();
     let united = UnitedScenes::of(&scenes);
     let tables: Vec<&Faces> = pictures.iter().map(|seen| &seen.faces).collect();
-    let (faces, new_ids) = united.faces(&tables, &PlaneGroups::of(&united.scene));
+    let (mut faces, new_ids) = united.faces(&tables);
+    let scene = united.into_scene();
+    PlaneGroups::of(&scene).share_planes(&mut faces);
 
     let merged: Vec<SpanBand> = bands_of(first.spans.line_count())
         .into_par_iter()
@@ -64,7 +66,7 @@ pub fn composite_spans(pictures: &[SeenSpans]) -> Result<SeenSpans, CompositeErr
         first.spans.sub_scanlines_per_row(),
     );
     let spans = Spans::new(width, height, n, merged);
-    Ok(SeenSpans::of(&united.scene, &first.camera, faces, &spans))
+    Ok(SeenSpans::of(&scene, &first.camera, faces, &spans))
 }
 
 /// Sub-scanlines that a task merges.

@@ -1,11 +1,14 @@
-use super::merge;
-use crate::scene::PlaneGroups;
+use super::merge::Meeting;
+use crate::scene::{FaceIndex, PlaneGroups};
 use std::cmp::Reverse;
+use std::collections::HashMap;
+use std::ops::Range;
+use veduta_geometry::DMat4;
 use veduta_map::scene::{
     Image, ImageId, Layer, Material, Mesh, MeshId, Object, ObjectKey, Scene, World,
 };
 use veduta_map::{
-    Affine, Camera, FaceId, Faces, MaterialId, ObjectId, PlaneId, Projection, Seen, SeenScene,
+    Camera, FaceId, Faces, MaterialId, ObjectId, ObjectMesh, PlaneId, Projection, Seen, SeenScene,
     VisibilityMap,
 };
 
@@ -61,15 +64,12 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
     let shown = maps.len();
     let maps: Vec<&SeenScene> = maps.iter().chain(holdouts).collect();
     let first = maps.first().ok_or(CompositeError::Nothing)?;
-    let views = maps
-        .iter()
-        .map(|seen| (&seen.map.camera, &seen.scene.world));
-    refuse_other_views(views)?;
+    let views = maps.iter();
+    refuse_other_views(views.map(|seen| (&seen.map.camera, &seen.scene.world)))?;
     let scenes: Vec<&Scene> = maps.iter().map(|seen| &seen.scene).collect();
     let united = UnitedScenes::of(&scenes);
-    let groups = PlaneGroups::of(&united.scene);
     let tables: Vec<&Faces> = maps.iter().map(|seen| &seen.map.faces).collect();
-    let (faces, new_ids) = united.faces(&tables, &groups);
+    let (mut faces, new_ids) = united.faces(&tables);
     let seen: Vec<Seen> = maps
         .iter()
         .zip(&new_ids)
@@ -87,20 +87,33 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
         near: nears.fold(f64::INFINITY, f64::min),
         ..first.map.camera
     };
-    let mut is_shown = vec![false; faces.len()];
-    for face in new_ids[..shown].iter().flatten() {
-        is_shown[face.index()] = true;
+    let mut meeting = Meeting::of(&faces, &seen, camera.aspect());
+    united.share_planes(&mut faces, &mut meeting);
+    let Seen {
+        mut opaque,
+        mut veils,
+    } = meeting.merge(&faces);
+    if shown < maps.len() {
+        let mut is_shown = vec![false; faces.len()];
+        for face in new_ids[..shown].iter().flatten() {
+            is_shown[face.index()] = true;
+        }
+        for fragments in [&mut opaque, &mut veils] {
+            *fragments = fragments.selected(|face| is_shown[face.index()]);
+        }
     }
-    let Seen { opaque, veils } = merge(&faces, &seen, camera.aspect());
-    let [opaque, veils] =
-        [opaque, veils].map(|fragments| fragments.selected(|face| is_shown[face.index()]));
     let map = VisibilityMap {
         camera,
         faces,
         opaque,
         veils,
     };
-    Ok(SeenScene::of(&united.scene, &map, first.size))
+    Ok(SeenScene::of_meshes(
+        &united.scene,
+        &united.meshes,
+        &map,
+        first.size,
+    ))
 }
 
 /// Fails on the first view that cannot be composited with that before all.
@@ -124,7 +137,7 @@ pub(super) fn refuse_other_views<'a>(
 /// Scenes as one, with their objects in the order of [`Scene::key_order`]; also where they are told scene
 /// by scene or united before. Cameras, meshes without an object and layers without one are left out.
 pub fn unite(scenes: &[&Scene]) -> Scene {
-    UnitedScenes::of(scenes).scene
+    UnitedScenes::of(scenes).into_scene()
 }
 
 /// In what two cameras differ, in words for the user. Near planes may: nearness does not depend on them.
@@ -193,14 +206,17 @@ fn world_difference(one: &World, other: &World) -> Option<String> {
 }
 
 /// Several scenes as one.
-pub(super) struct UnitedScenes {
-    pub scene: Scene,
-    /// Of each of them, the new numbers of its objects.
+pub(super) struct UnitedScenes<'a> {
+    /// Without meshes.
+    scene: Scene,
+    /// Those of its objects.
+    meshes: Vec<ObjectMesh<'a>>,
+    /// Of each of the scenes, the new numbers of its objects.
     objects: Vec<Vec<ObjectId>>,
 }
 
-impl UnitedScenes {
-    pub fn of(scenes: &[&Scene]) -> Self {
+impl<'a> UnitedScenes<'a> {
+    pub fn of(scenes: &[&'a Scene]) -> Self {
         let placed = scenes.iter().find(|scene| scene.world.crs.is_some());
         let mut united = Scene {
             world: placed
@@ -219,24 +235,22 @@ impl UnitedScenes {
             .iter()
             .map(|scene| vec![ObjectId(0); scene.objects.len()])
             .collect();
-        // Objects that share a mesh go on to do so.
-        let mut new_meshes: Vec<Vec<Option<MeshId>>> = scenes
+        let first_material: Vec<u32> = scenes
             .iter()
-            .map(|scene| vec![None; scene.meshes.len()])
+            .map(|scene| add_materials(&mut united, &scene.materials, &scene.images))
             .collect();
-        let mut meshes: Vec<(usize, &Mesh)> = Vec::new();
+        let mut meshes: Vec<ObjectMesh> = Vec::with_capacity(order.len());
         for &((Reverse(priority), layer, _), number, object) in &order {
             let id = ObjectId::from_index(united.objects.len());
             objects[number][object.index()] = id;
-            let from = scenes[number].object(object);
-            let new_mesh = &mut new_meshes[number][from.mesh.0 as usize];
-            let mesh = *new_mesh.get_or_insert_with(|| {
-                meshes.push((number, scenes[number].mesh_of(object)));
-                MeshId(meshes.len() as u32 - 1)
+            let from = scenes[number];
+            meshes.push(ObjectMesh {
+                mesh: from.mesh_of(object),
+                first_material: first_material[number],
             });
             united.objects.push(Object {
-                mesh,
-                ..from.clone()
+                mesh: MeshId(id.0),
+                ..from.object(object).clone()
             });
             if has_layers {
                 match united.layers.last_mut() {
@@ -251,17 +265,6 @@ impl UnitedScenes {
                 }
             }
         }
-        let first_material: Vec<u32> = scenes
-            .iter()
-            .map(|scene| add_materials(&mut united, &scene.materials, &scene.images))
-            .collect();
-        for (number, mesh) in meshes {
-            let mut mesh = mesh.clone();
-            for (_, material) in &mut mesh.materials {
-                *material = MaterialId(material.0 + first_material[number]);
-            }
-            united.meshes.push(mesh);
-        }
         for light in scenes.iter().flat_map(|scene| &scene.lights) {
             if !united.lights.contains(light) {
                 united.lights.push(light.clone());
@@ -269,20 +272,45 @@ impl UnitedScenes {
         }
         Self {
             scene: united,
+            meshes,
             objects,
         }
     }
 
-    /// The faces of all scenes as one table in the order of the objects, and of each scene the new
-    /// numbers of its faces. Faces of one plane share it.
-    pub fn faces(&self, tables: &[&Faces], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
-        let mut order: Vec<(ObjectId, FaceId, usize)> = Vec::new();
-        for (map, table) in tables.iter().enumerate() {
-            let object = |face: FaceId| self.objects[map][table.object(face).index()];
-            order.extend(table.ids().map(|face| (object(face), face, map)));
+    /// The scene with its meshes. Objects that shared one go on to do so.
+    pub fn into_scene(self) -> Scene {
+        let mut scene = self.scene;
+        let mut known: HashMap<*const Mesh, MeshId> = HashMap::new();
+        for (object, of) in scene.objects.iter_mut().zip(&self.meshes) {
+            object.mesh = *known.entry(std::ptr::from_ref(of.mesh)).or_insert_with(|| {
+                let mut mesh = of.mesh.clone();
+                for (_, material) in &mut mesh.materials {
+                    *material = MaterialId(material.0 + of.first_material);
+                }
+                scene.meshes.push(mesh);
+                MeshId(scene.meshes.len() as u32 - 1)
+            });
         }
-        order.sort_unstable();
-        let mut faces = Faces::with_capacity(order.len());
+        scene
+    }
+
+    /// The faces of all scenes as one table in the order of the objects, and of each scene the new
+    /// numbers of its faces.
+    pub fn faces(&self, tables: &[&Faces]) -> (Faces, Vec<Vec<FaceId>>) {
+        // Faces of an object follow one another in its table.
+        let mut runs: Vec<(ObjectId, usize, Range<u32>)> = Vec::new();
+        for (map, table) in tables.iter().enumerate() {
+            for face in table.ids() {
+                let object = self.objects[map][table.object(face).index()];
+                match runs.last_mut() {
+                    Some(run) if run.0 == object && run.1 == map => run.2.end += 1,
+                    _ => runs.push((object, map, face.0..face.0 + 1)),
+                }
+            }
+        }
+        runs.sort_by_key(|run| run.0);
+        let count = tables.iter().map(|table| table.len()).sum();
+        let mut faces = Faces::with_capacity(count);
         let mut new_ids: Vec<Vec<FaceId>> = tables
             .iter()
             .map(|table| vec![FaceId(0); table.len()])
@@ -290,23 +318,45 @@ impl UnitedScenes {
         let mut first_plane = Vec::with_capacity(tables.len());
         for table in tables {
             first_plane.push(faces.planes().len() as u32);
-            let planes: &[Affine] = table.planes();
-            planes.iter().for_each(|&plane| {
+            for &plane in table.planes() {
                 faces.push_plane(plane);
-            });
-        }
-        for (object, face, map) in order {
-            let table = tables[map];
-            let plane = PlaneId(table.plane(face).0 + first_plane[map]);
-            let id = faces.push(table.outline(face), plane, object, table.source(face));
-            let id = id.expect("a face of a table has an area");
-            if table.is_veil(face) {
-                faces.set_veil(id);
             }
-            new_ids[map][face.index()] = id;
         }
-        groups.share_planes(&mut faces);
+        for (object, map, run) in runs {
+            let table = tables[map];
+            for face in run.map(FaceId) {
+                let plane = PlaneId(table.plane(face).0 + first_plane[map]);
+                let source = table.source(face);
+                new_ids[map][face.index()] = faces.push_row(table, face, plane, object, source);
+            }
+        }
         (faces, new_ids)
+    }
+
+    /// Gives faces of different maps that meet in one plane that plane.
+    fn share_planes(&self, faces: &mut Faces, meeting: &mut Meeting) {
+        let objects = self.scene.objects.iter();
+        let placed: Vec<(&Mesh, DMat4)> = objects
+            .zip(&self.meshes)
+            .map(|(object, of)| (of.mesh, object.world_from_object))
+            .collect();
+        let index_of = |faces: &Faces, face: FaceId| (faces.object(face).0, faces.source(face));
+        let candidates: Vec<(FaceId, (FaceIndex, u32))> = meeting
+            .faces()
+            .into_iter()
+            .map(|(face, map)| (face, (index_of(faces, face), map)))
+            .collect();
+        let indices: Vec<(FaceIndex, u32)> = candidates.iter().map(|pair| pair.1).collect();
+        let groups = PlaneGroups::among_maps(&placed, &indices);
+        let id_of = |index: FaceIndex| {
+            let row = candidates.partition_point(|&(_, (other, _))| other < index);
+            candidates[row].0
+        };
+        for &(face, first) in groups.pairs() {
+            let face = id_of(face);
+            faces.share_plane(face, id_of(first));
+            meeting.plane_changed(faces, face);
+        }
     }
 }
 

@@ -46,8 +46,9 @@ pub fn render_deep<E>(
     let height = frame.height as usize;
     let count = faces.len().div_ceil(FACES_PER_STRIP).clamp(1, height);
     let rows: Vec<usize> = (0..=count).map(|strip| strip * height / count).collect();
-    let border = |&row: &usize| row as f64 / height as f64;
-    let strips = Strips::new(&faces, rows.iter().map(border).collect());
+    let border = |row: usize| row as f64 / height as f64;
+    let extents = rows.windows(2).map(|rows| [rows[0], rows[1]].map(border));
+    let strips = Strips::new(&faces, extents.collect());
     let in_view = faces.ids().map(|face| material_of(scene, &faces, face));
     let textures = Textures::new(scene, &in_view.collect());
     for strip in 0..count {
