@@ -7,6 +7,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::ExitCode;
 use veduta::accumulate::Picture;
+use veduta::filter::Filter;
 use veduta::map::VisibilityMap;
 use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
@@ -32,6 +33,7 @@ Tables:
   zbuffer   the exact map, and picture, against a z-buffer with one sample a pixel
   engines   all methods, supersampling included
   stored    stored maps: compositing two and eight, writing, reading, a window of a sixteenth, zoom
+  filters   pixels of a map by each filter, and as a ratio to the box filter
 
 Columns: map is the exact map alone, exact the map and its pixels. Window reads: the largest share of
 the bytes over 49 windows, and the share of the fragments that touch that window. Pixels: those of a map made
@@ -57,7 +59,7 @@ struct Measurement {
     row: fn(&Case) -> Vec<String>,
 }
 
-const MEASUREMENTS: [Measurement; 4] = [
+const MEASUREMENTS: [Measurement; 5] = [
     Measurement {
         name: "stored",
         scenes: &[
@@ -87,6 +89,20 @@ const MEASUREMENTS: [Measurement; 4] = [
             "ratio",
         ],
         row: stored,
+    },
+    Measurement {
+        name: "filters",
+        scenes: &["balls7", "bridge@1920x1080", "field1m@1920x1080"],
+        titles: &[
+            "scene, ms",
+            "map",
+            "box",
+            "triangle",
+            "ratio",
+            "mitchell",
+            "ratio",
+        ],
+        row: filters,
     },
     Measurement {
         name: "n-et",
@@ -315,6 +331,33 @@ fn stored(case: &Case) -> Vec<String> {
     ]
 }
 
+/// From a map to pixels, by filters of radius 1/2, 1 and 2. All cubics take as long as Mitchell's.
+fn filters(case: &Case) -> Vec<String> {
+    let mut map = case.empty_map();
+    case.find_into(&mut map);
+    let picture = |filter| black_box(case.picture_of(&map, filter));
+    let [find, sharp, triangle, mitchell] = least_times(
+        ROUNDS,
+        [
+            &mut || exact_map(case),
+            &mut || drop(picture(Filter::Box)),
+            &mut || drop(picture(Filter::Triangle)),
+            &mut || drop(picture(Filter::Mitchell)),
+        ],
+    )
+    .map(milliseconds);
+    let ratio = |time: f64| format!("{:.1}", time / sharp);
+    vec![
+        case.title(),
+        ms(find),
+        ms(sharp),
+        ms(triangle),
+        ratio(triangle),
+        ms(mitchell),
+        ratio(mitchell),
+    ]
+}
+
 /// All methods.
 fn engines(case: &Case) -> Vec<String> {
     let mut buffer = ZBuffer::new(case.width, case.height);
@@ -349,7 +392,7 @@ fn exact_picture(case: &Case, map: &mut VisibilityMap) {
 
 fn multiscan_picture(case: &Case, n: u32) {
     let spans = multiscan::find_spans(&case.faces, case.width, case.height, n);
-    black_box(spans.picture(|face| case.color(face)));
+    black_box(multiscan::picture(&spans, |face| case.color(face)));
 }
 
 /// A z-buffer with `n` x `n` samples for each pixel, and the picture made of it.
