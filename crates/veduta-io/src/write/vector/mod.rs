@@ -88,10 +88,10 @@ pub struct VectorOptions {
 pub const MOST_DECIMALS: u8 = 9;
 
 impl Default for VectorOptions {
-    /// Thousandths of a pixel, no background, black lines of one pixel.
+    /// Hundredths of a pixel, no background, black lines of one pixel.
     fn default() -> Self {
         Self {
-            decimals: 3,
+            decimals: 2,
             background: None,
             line_width: 1.0,
             line_color: [0.0; 3],
@@ -166,5 +166,14 @@ fn name_of_lines(kind: LineKind) -> &'static str {
         LineKind::Silhouette => "silhouettes",
         LineKind::Boundary => "boundaries",
         LineKind::Crease => "creases",
+        LineKind::Hidden => "hidden",
     }
+}
+
+/// Width, dash and gap of hidden lines beside others of `width`: narrow and dashed, in the proportions of
+/// ISO 128 (a dash of twelve widths, a gap of three).
+#[cfg(any(feature = "svg", feature = "pdf"))]
+fn hidden_line(width: f64) -> [f64; 3] {
+    let narrow = 0.5 * width;
+    [narrow, 12.0 * narrow, 3.0 * narrow]
 }

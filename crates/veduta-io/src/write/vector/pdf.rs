@@ -1,15 +1,16 @@
 use super::outline::{Point, Rounding};
-use super::{VectorOptions, name_of_lines, srgb8};
+use super::{VectorOptions, hidden_line, name_of_lines, srgb8};
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::{Array, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
 use std::fmt::Write;
-use veduta::drawing::Drawing;
+use veduta::drawing::{Drawing, LineKind, Underpainting};
+use veduta_geometry::DVec2;
 
 /// Points (1/72 inch) of a pixel, of which CSS has 96 to an inch.
 const POINTS_PER_PIXEL: f64 = 0.75;
 
 /// How hard to compress, of 10.
-const COMPRESSION: u8 = 6;
+const COMPRESSION: u8 = 9;
 
 /// A PDF of one page. Groups are optional content groups, which viewers list as layers; a part of
 /// the page within the marks of its group and of all around it shows when all of them are on.
@@ -135,6 +136,9 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
         let [width, height] = drawing.size;
         content.push(format_args!("0 0 {width} {height} re f\n"));
     }
+    if let Some(Underpainting { outlines, radiance }) = &drawing.underpainting {
+        content.shape(outlines, *radiance);
+    }
     let mut open: Vec<u32> = Vec::new();
     for (index, group) in (0u32..).zip(&drawing.groups) {
         while open.last().copied() != group.parent {
@@ -146,15 +150,7 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
         let layer = layers.push(&group.name, group.parent.map(|parent| parent as usize));
         content.begin_layer(layer);
         for shape in &drawing.shapes[group.shapes.clone()] {
-            let rings = content.rounding.rings(&shape.painted);
-            if !rings.is_empty() {
-                content.fill(srgb8(shape.radiance));
-                for ring in &rings {
-                    content.path(ring);
-                    content.text.push_str("h\n");
-                }
-                content.text.push_str("f\n");
-            }
+            content.shape(&shape.painted, shape.radiance);
         }
     }
     for _ in open {
@@ -186,15 +182,31 @@ impl Content {
     }
 
     fn color(&mut self, color: [u8; 3], operator: &str) {
-        // Four decimals tell each of the 256 values.
-        let [r, g, b] = color.map(|channel| f64::from(channel) / 255.0);
-        self.push(format_args!("{r:.4} {g:.4} {b:.4} {operator}\n"));
+        for channel in color {
+            // Three decimals tell each of the 256 values.
+            let value = (f64::from(channel) / 0.255).round() as i64;
+            Rounding::new(3).push(&mut self.text, value);
+            self.text.push(' ');
+        }
+        self.push(format_args!("{operator}\n"));
     }
 
     fn fill(&mut self, color: [u8; 3]) {
         if self.fill != Some(color) {
             self.fill = Some(color);
             self.color(color, "rg");
+        }
+    }
+
+    fn shape(&mut self, outlines: &[Vec<DVec2>], radiance: [f32; 3]) {
+        let rings = self.rounding.rings(outlines);
+        if !rings.is_empty() {
+            self.fill(srgb8(radiance));
+            for ring in &rings {
+                self.path(ring);
+                self.text.push_str("h\n");
+            }
+            self.text.push_str("f\n");
         }
     }
 
@@ -208,6 +220,11 @@ impl Content {
         for strokes in drawing.strokes.chunk_by(|a, b| a.kind == b.kind) {
             let layer = layers.push(name_of_lines(strokes[0].kind), Some(all));
             self.begin_layer(layer);
+            let is_hidden = strokes[0].kind == LineKind::Hidden;
+            if is_hidden {
+                let [narrow, dash, gap] = hidden_line(width);
+                self.push(format_args!("q {narrow} w 0 J [{dash} {gap}] 0 d\n"));
+            }
             for stroke in strokes {
                 let (chain, end) = if stroke.closed {
                     (self.rounding.ring(&stroke.points), "s\n")
@@ -218,6 +235,9 @@ impl Content {
                     self.path(&chain);
                     self.text.push_str(end);
                 }
+            }
+            if is_hidden {
+                self.text.push_str("Q\n");
             }
             self.text.push_str("EMC\n");
         }
@@ -230,7 +250,7 @@ impl Content {
                 self.rounding.push(&mut self.text, value);
                 self.text.push(' ');
             }
-            self.text.push_str(if index == 0 { "m\n" } else { "l\n" });
+            self.text.push_str(if index == 0 { "m " } else { "l " });
         }
     }
 }

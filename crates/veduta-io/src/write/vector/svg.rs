@@ -1,8 +1,8 @@
 use super::outline::{Point, Rounding};
-use super::{VectorOptions, name_of_lines, srgb8};
+use super::{VectorOptions, hidden_line, name_of_lines, srgb8};
 use std::collections::HashSet;
 use std::fmt::Write;
-use veduta::drawing::Drawing;
+use veduta::drawing::{Drawing, LineKind, Underpainting};
 
 /// SVG text. Groups nest as names do; a path is a shape, in relative coordinates.
 pub fn encode(drawing: &Drawing, options: &VectorOptions) -> String {
@@ -37,6 +37,14 @@ impl Svg {
             self.push(format_args!(
                 "<rect width=\"{width}\" height=\"{height}\" fill=\"{color}\"/>\n"
             ));
+        }
+        if let Some(Underpainting { outlines, radiance }) = &drawing.underpainting {
+            let rings = self.rounding.rings(outlines);
+            let id = self.id("underpainting");
+            let color = Color(srgb8(*radiance));
+            self.push(format_args!("<path id=\"{id}\" fill=\"{color}\" d=\""));
+            self.path(&rings, true);
+            self.text.push_str("\"/>\n");
         }
         self.groups(drawing);
         if !drawing.strokes.is_empty() {
@@ -78,7 +86,18 @@ impl Svg {
              stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
         ));
         for strokes in drawing.strokes.chunk_by(|a, b| a.kind == b.kind) {
-            self.begin_group(name_of_lines(strokes[0].kind));
+            let name = name_of_lines(strokes[0].kind);
+            if strokes[0].kind == LineKind::Hidden {
+                let id = self.id(name);
+                let [narrow, dash, gap] = hidden_line(width);
+                self.push(format_args!(
+                    "<g id=\"{id}\" stroke-width=\"{narrow}\" stroke-dasharray=\"{dash} {gap}\" \
+                     stroke-linecap=\"butt\">"
+                ));
+                self.title(name);
+            } else {
+                self.begin_group(name);
+            }
             for stroke in strokes {
                 let chain = if stroke.closed {
                     self.rounding.ring(&stroke.points)
