@@ -309,17 +309,17 @@ pub fn draw_window(
     drawing::draw(scene, map, &looks, grid, settings)
 }
 
-/// What each opaque fragment looks like; the same for all of a face.
+/// What each fragment looks like; the same for all of a face.
 fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Vec<Look> {
     let textures = Textures::new(scene, &materials_seen(scene, map));
     let shown = map.shown_faces();
     let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
-    // Of each fragment that is not even: the sum of area times radiance, and of area.
-    let mut sums = vec![[0.0; 4]; shown.len()];
+    // Of each fragment that is not even.
+    let mut sums = vec![LookSum::default(); shown.len()];
     if (0..shown.len() as u32).any(|fragment| surfaces.varies(fragment)) {
         let bands = Bands::new(map, *grid);
-        let of_bands: Vec<Vec<(u32, [f64; 4])>> = (0..bands.len())
+        let of_bands: Vec<Vec<(u32, LookSum)>> = (0..bands.len())
             .into_par_iter()
             .map_init(BandBuffers::default, |buffers, band| {
                 buffers.fragment_sums(&surfaces, map, &bands, band)
@@ -327,33 +327,37 @@ fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> V
             .collect();
         // In the order of bands, whichever was ready first.
         for (fragment, sum) in of_bands.into_iter().flatten() {
-            add(&mut sums[fragment as usize], sum);
+            sums[fragment as usize].add(&sum);
         }
     }
     let mut looks = Vec::with_capacity(shown.len());
-    for fragments in shown[..map.opaque.len()].chunk_by(|a, b| a == b) {
+    for fragments in shown.chunk_by(|a, b| a == b) {
         let first = looks.len();
-        let mut sum = [0.0; 4];
+        let mut sum = LookSum::default();
         for of_fragment in &sums[first..first + fragments.len()] {
-            add(&mut sum, *of_fragment);
+            sum.add(of_fragment);
         }
         let (object, source) = (faces.object(fragments[0]), faces.source(fragments[0]));
         let material = scene.mesh_of(object).material_of(source);
         let textures = scene.material(material);
         let has_picture =
             textures.base_color_texture.is_some() || textures.emissive_texture.is_some();
-        let (radiance, evenness) = match surfaces.constant(first as u32) {
-            Some(radiance) => (radiance, Evenness::Even),
+        let (radiance, evenness, opacity) = match surfaces.constant(first as u32) {
+            Some(radiance) => {
+                let opacity = surfaces.constant_opacity(first as u32).unwrap_or(1.0);
+                (radiance, Evenness::Even, opacity)
+            }
             None => {
-                let [r, g, b, area] = sum;
                 // An area too small for a float is too small to be seen: any colour will do.
-                let mean = |sum: f64| if area > 0.0 { (sum / area) as f32 } else { 0.0 };
+                let share = |sum: f64, of: f64| if of > 0.0 { (sum / of) as f32 } else { 0.0 };
+                let mean = |of_channel: f64| share(of_channel, sum.opacity);
                 let evenness = if has_picture {
                     Evenness::Picture
                 } else {
                     Evenness::Gradual
                 };
-                ([r, g, b].map(mean), evenness)
+                let opacity = share(sum.opacity, sum.area);
+                (sum.radiance.map(mean), evenness, opacity)
             }
         };
         let look = Look {
@@ -361,15 +365,39 @@ fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> V
             material,
             radiance,
             evenness,
+            opacity,
         };
         looks.extend(fragments.iter().map(|_| look));
     }
     looks
 }
 
-fn add(sum: &mut [f64; 4], other: [f64; 4]) {
-    for (channel, other) in sum.iter_mut().zip(other) {
-        *channel += other;
+/// Sums over what is seen of a fragment.
+#[derive(Clone, Copy, Debug, Default)]
+struct LookSum {
+    /// Of area times opacity times radiance.
+    radiance: [f64; 3],
+    /// Of area times opacity.
+    opacity: f64,
+    /// In pixels.
+    area: f64,
+}
+
+impl LookSum {
+    fn of(area: f64, opacity: f64, radiance: [f32; 3]) -> Self {
+        Self {
+            radiance: radiance.map(|channel| area * opacity * f64::from(channel)),
+            opacity: area * opacity,
+            area,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (channel, other) in self.radiance.iter_mut().zip(other.radiance) {
+            *channel += other;
+        }
+        self.opacity += other.opacity;
+        self.area += other.area;
     }
 }
 
@@ -463,15 +491,14 @@ struct BandBuffers {
 }
 
 impl BandBuffers {
-    /// Of the fragments in a band that are not even, ascending: the sum of area times radiance, and of
-    /// area.
+    /// Of the fragments in a band that are not even, ascending.
     fn fragment_sums(
         &mut self,
         surfaces: &Surfaces,
         map: &VisibilityMap,
         bands: &Bands,
         band: usize,
-    ) -> Vec<(u32, [f64; 4])> {
+    ) -> Vec<(u32, LookSum)> {
         let (grid, parts) = (bands.grid(), &mut self.parts);
         let varies = |fragment| surfaces.varies(fragment);
         dice::dice(map, bands, band, varies, &mut self.dicer, parts);
@@ -479,23 +506,28 @@ impl BandBuffers {
         parts.boundary.retain(|part| varies(part.fragment));
         parts.runs.retain(|run| varies(run.fragment));
         surfaces.shade(parts, grid, bands.rows(band).start, &mut self.radiance);
-        let mut values: Vec<(u32, [f64; 4])> = Vec::new();
-        let weighted = |area: f64, [r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c| area * f64::from(c));
-        for (part, &radiance) in parts.boundary.iter().zip(&self.radiance.boundary) {
-            values.push((part.fragment, weighted(f64::from(part.area), radiance)));
+        let mut values: Vec<(u32, LookSum)> = Vec::new();
+        // Veils come last.
+        let opacities = &self.radiance.opacities;
+        let opaque = std::iter::repeat_n(&1.0, parts.boundary.len() - opacities.len());
+        let opacities = opaque.chain(opacities).copied().map(f64::from);
+        let lit = parts.boundary.iter().zip(&self.radiance.boundary);
+        for ((part, &radiance), opacity) in lit.zip(opacities) {
+            let sum = LookSum::of(f64::from(part.area), opacity, radiance);
+            values.push((part.fragment, sum));
         }
         for (index, run) in parts.runs.iter().enumerate() {
-            let mut sum = [0.0; 4];
+            let mut sum = LookSum::default();
             for &radiance in self.radiance.of_run(index) {
-                add(&mut sum, weighted(1.0, radiance));
+                sum.add(&LookSum::of(1.0, 1.0, radiance));
             }
             values.push((run.fragment, sum));
         }
         values.sort_by_key(|value| value.0);
         let of_fragments = values.chunk_by(|a, b| a.0 == b.0);
-        let sum_up = |values: &[(u32, [f64; 4])]| {
-            let mut sum = [0.0; 4];
-            values.iter().for_each(|value| add(&mut sum, value.1));
+        let sum_up = |values: &[(u32, LookSum)]| {
+            let mut sum = LookSum::default();
+            values.iter().for_each(|value| sum.add(&value.1));
             (values[0].0, sum)
         };
         of_fragments.map(sum_up).collect()

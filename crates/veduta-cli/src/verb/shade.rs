@@ -70,10 +70,14 @@ impl Shade {
         let vector = match self.output.vector_target(&self.map, json)? {
             Some(target) => {
                 let settings = self.vector.drawing(target.format)?;
-                self.vector.refuse_hidden(&self.map)?;
                 if settings.lines.contains(&LineKind::Boundary) {
                     let message = "a map holds the faces that are seen, so that it cannot tell which \
                         edges have a single one; draw boundaries by veduta render";
+                    return Err(Failure::new(Code::Usage, message));
+                }
+                if settings.lines.contains(&LineKind::Hidden) {
+                    let message = "a map holds the faces that are seen, and hidden lines are edges of \
+                        others too; draw them by veduta render";
                     return Err(Failure::new(Code::Usage, message));
                 }
                 Some((target, settings))

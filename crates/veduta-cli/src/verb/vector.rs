@@ -14,7 +14,7 @@ use veduta::accumulate::Picture;
 use veduta::dice::PixelGrid;
 use veduta::drawing::{self, Drawing, Evenness, Joining, LineKind};
 use veduta::map::VisibilityMap;
-use veduta::pipeline::{self, Shortcoming};
+use veduta::pipeline;
 use veduta::scene::Scene;
 use veduta_io::{VectorFormat, VectorOptions, WriteProblem, stream_drawing, write_drawing};
 
@@ -90,19 +90,6 @@ impl Vector {
         }
     }
 
-    /// Fails if hidden lines are asked for, of a map without hidden faces.
-    pub fn refuse_hidden(&self, map: &Path) -> Result<(), Failure> {
-        if !self.lines.contains(&Line::Hidden) {
-            return Ok(());
-        }
-        let message = format!(
-            "{}: --lines hidden needs the faces that are not seen, and a stored map has only those that are; \
-             make the picture of the scene, with `veduta render`",
-            map.display()
-        );
-        Err(Failure::new(Code::Unsupported, message))
-    }
-
     /// Whether shapes are to be filled.
     fn has_shapes(&self) -> bool {
         self.fill != Some(Fill::None)
@@ -175,10 +162,7 @@ impl Vector {
             strict,
         } = *subject;
         let background = development.plain_background()?;
-        let mut shortcomings = pipeline::shortcomings(scene, map);
-        if !map.veils.is_empty() {
-            shortcomings.push(Shortcoming::VeilsLeftOut(map.veils.len()));
-        }
+        let shortcomings = pipeline::shortcomings(scene, map);
         tell_shortcomings(file, scene, &shortcomings, strict, talk)?;
         talk.begin("drawing");
         let mut drawing = pipeline::draw_window(scene, map, grid, unlit, settings);
@@ -200,7 +184,8 @@ impl Vector {
         let title = file.file_name().unwrap_or_default().to_string_lossy();
         target.write(&drawing, &self.options(title.into_owned(), background))?;
         talk.end();
-        let (shapes, strokes) = (drawing.shapes.len(), drawing.strokes.len());
+        let shapes = drawing.shapes.len() + drawing.veils.len();
+        let strokes = drawing.strokes.len();
         talk.detail(format_args!(
             "{} fragments, {shapes} shapes, {strokes} lines, exposure {ev:.2} EV",
             map.opaque.len()
@@ -258,7 +243,7 @@ fn tell_means(
         "{}: {uneven} of {} shapes have the mean of their colours, which differ from point to point \
          (textures, smooth normals, colours at corners)",
         file.display(),
-        drawing.shapes.len()
+        drawing.shapes.len() + drawing.veils.len()
     );
     if strict {
         let message = format!("{message} (an error because of --strict)");
@@ -270,22 +255,28 @@ fn tell_means(
 
 /// How many shapes have the mean of several colours.
 fn uneven_shapes(drawing: &Drawing) -> usize {
-    let shapes = drawing.shapes.iter();
+    let shapes = drawing.shapes.iter().map(|shape| shape.evenness);
+    let veils = drawing.veils.iter().map(|veil| veil.evenness);
     shapes
-        .filter(|shape| shape.evenness != Evenness::Even)
+        .chain(veils)
+        .filter(|evenness| *evenness != Evenness::Even)
         .count()
 }
 
 /// All that is to be developed.
 fn radiances(drawing: &mut Drawing) -> impl Iterator<Item = &mut [f32; 3]> {
     let shapes = drawing.shapes.iter_mut().map(|shape| &mut shape.radiance);
+    let veils = drawing.veils.iter_mut().map(|veil| &mut veil.radiance);
     let beneath = drawing.underpainting.iter_mut();
-    shapes.chain(beneath.map(|beneath| &mut beneath.radiance))
+    let beneath = beneath.map(|beneath| &mut beneath.radiance);
+    shapes.chain(veils).chain(beneath)
 }
 
 /// A pixel for each, so that they are developed as pictures are.
 fn picture_of_colors(drawing: &mut Drawing) -> Picture {
-    let pixels: Vec<_> = radiances(drawing).map(|&mut [r, g, b]| [r, g, b, 1.0]).collect();
+    let pixels: Vec<_> = radiances(drawing)
+        .map(|&mut [r, g, b]| [r, g, b, 1.0])
+        .collect();
     Picture {
         width: pixels.len() as u32,
         height: 1,

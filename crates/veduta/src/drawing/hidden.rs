@@ -83,7 +83,8 @@ fn edges(judge: &Judge, map: &VisibilityMap, places: &Places) -> Vec<Edge> {
         .collect();
     let place = |side: &Side| side.ends.map(|end| [end.x, end.y]);
     let order = |a: &Side, b: &Side| {
-        let [a_place, b_place] = [place(a), place(b)].map(|ends| [ends[0][0], ends[0][1], ends[1][0], ends[1][1]]);
+        let [a_place, b_place] =
+            [place(a), place(b)].map(|ends| [ends[0][0], ends[0][1], ends[1][0], ends[1][1]]);
         let by_place = a_place.iter().zip(&b_place).map(|(a, b)| a.total_cmp(b));
         let by_place = by_place.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then);
         by_place
@@ -93,9 +94,7 @@ fn edges(judge: &Judge, map: &VisibilityMap, places: &Places) -> Vec<Edge> {
     sides.par_sort_unstable_by(order);
     let unit = |nearness: f64| JOINED * super::join::depth_unit(&map.camera, nearness);
     let joined: Vec<&[Side]> = sides
-        .chunk_by(|a, b| {
-            place(a) == place(b) && b.nearness - a.nearness <= unit(a.nearness)
-        })
+        .chunk_by(|a, b| place(a) == place(b) && b.nearness - a.nearness <= unit(a.nearness))
         .collect();
     joined
         .par_iter()
@@ -144,11 +143,15 @@ fn is_wanted(
         let is_contour = rest.iter().all(|side| side.forth == first.forth);
         if is_contour {
             // Faces on both sides of one sheet have no contour between them.
-            let turns = rest.iter().any(|side| angle_with(side.face) > COPLANAR_ANGLE);
+            let turns = rest
+                .iter()
+                .any(|side| angle_with(side.face) > COPLANAR_ANGLE);
             return turns && judge.wants(LineKind::Silhouette)
                 || judge.wants(LineKind::Boundary) && judge.is_boundary(first.face, first.ends);
         }
-        return rest.iter().any(|side| judge.is_crease(angle_with(side.face)));
+        return rest
+            .iter()
+            .any(|side| judge.is_crease(angle_with(side.face)));
     }
     let is_boundary = || judge.is_boundary(first.face, first.ends);
     // A corner of one may lie on the edge of the other, so that they share no edge.
@@ -209,8 +212,16 @@ fn hidden_parts(map: &VisibilityMap, edge: &Edge, near: &[FaceId]) -> Vec<[DVec2
         .into_iter()
         .map(|[start, end]| {
             // What rounding leaves at the ends.
-            let start = if start * length <= NEGLIGIBLE_LENGTH { 0.0 } else { start };
-            let end = if (1.0 - end) * length <= NEGLIGIBLE_LENGTH { 1.0 } else { end };
+            let start = if start * length <= NEGLIGIBLE_LENGTH {
+                0.0
+            } else {
+                start
+            };
+            let end = if (1.0 - end) * length <= NEGLIGIBLE_LENGTH {
+                1.0
+            } else {
+                end
+            };
             [start, end]
         })
         .filter(|[start, end]| (end - start) * length > NEGLIGIBLE_LENGTH)
@@ -294,14 +305,22 @@ impl Places {
     /// The faces near a segment, ascending.
     fn along(&self, from: DVec2, to: DVec2, near: &mut Vec<FaceId>) {
         near.clear();
-        let (top, bottom) = if from.y <= to.y { (from, to) } else { (to, from) };
+        let (top, bottom) = if from.y <= to.y {
+            (from, to)
+        } else {
+            (to, from)
+        };
         for row in range(self.cells, top.y, bottom.y) {
             // Where it meets the row, and a little beyond.
             let x_at = |border: u32| {
                 let y = f64::from(border) / f64::from(self.cells);
                 let share = ((y - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
                 // Along the row all of it does.
-                if share.is_nan() { None } else { Some(top.x + share * (bottom.x - top.x)) }
+                if share.is_nan() {
+                    None
+                } else {
+                    Some(top.x + share * (bottom.x - top.x))
+                }
             };
             let [one, other] = match (x_at(row), x_at(row + 1)) {
                 (Some(one), Some(other)) => [one, other],

@@ -134,17 +134,11 @@ impl Alike {
     }
 
     /// Visits the rows that look like `look`.
-    fn each<'a>(
-        &self,
-        look: &Look,
-        look_of: impl Fn(u32) -> &'a Look,
-        mut visit: impl FnMut(u32),
-    ) {
+    fn each<'a>(&self, look: &Look, look_of: impl Fn(u32) -> &'a Look, mut visit: impl FnMut(u32)) {
         let least = look.radiance[0] - SAME_COLOR * brightest(look);
         let start = self.by_red.partition_point(|&row| {
             let other = look_of(row);
-            other.object < look.object
-                || other.object == look.object && other.radiance[0] < least
+            other.object < look.object || other.object == look.object && other.radiance[0] < least
         });
         let most = look.radiance[0] + SAME_COLOR * brightest(look);
         for &row in &self.by_red[start..] {
@@ -176,7 +170,7 @@ fn is_alike(a: &Look, b: &Look) -> bool {
 }
 
 /// Whether `face` lies in the plane of `first`.
-fn is_coplanar(map: &VisibilityMap, first: FaceId, face: FaceId) -> bool {
+pub(super) fn is_coplanar(map: &VisibilityMap, first: FaceId, face: FaceId) -> bool {
     let faces = &map.faces;
     let plane = faces.face_nearness(first);
     let difference = faces.face_nearness(face).minus(plane);

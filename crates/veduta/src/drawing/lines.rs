@@ -42,66 +42,45 @@ pub(super) fn strokes(
     }
     let judge = Judge::new(scene, map, subdivision, settings);
     let edges = subdivision.half_edges();
-    let mut pieces: Vec<Piece> = (0u32..)
-        .zip(edges)
-        .filter_map(|(index, edge)| {
-            let kind = judge.kind(index, edge)?;
-            Some(Piece {
-                kind,
-                from: edge.from,
-                to: edge.to,
-            })
-        })
-        .collect();
-    pieces.sort_by_key(|piece| piece.kind);
-    let mut strokes = Vec::new();
+    let seen = (0u32..).zip(edges).filter_map(|(index, edge)| {
+        let kind = judge.kind(index, edge)?;
+        Some((kind, subdivision.ends(index)))
+    });
+    let mut segments: Vec<(LineKind, [DVec2; 2])> = seen.collect();
     if settings.lines.contains(&LineKind::Hidden) {
-        strokes = hidden_strokes(&judge, map, &pieces, &subdivision.vertices, grid);
+        let hidden = hidden::segments(&judge, map);
+        segments.extend(hidden.into_iter().map(|ends| (LineKind::Hidden, ends)));
     }
+    let (pieces, vertices) = each_once(&segments);
     let of_kinds = pieces.chunk_by(|a, b| a.kind == b.kind);
-    strokes.extend(of_kinds.flat_map(|pieces| chains(pieces, &subdivision.vertices, grid)));
-    strokes.retain(|stroke| !stroke.points.is_empty());
+    let mut strokes: Vec<Stroke> = of_kinds
+        .flat_map(|pieces| chains(pieces, &vertices, grid))
+        .filter(|stroke| !stroke.points.is_empty())
+        .collect();
+    strokes.sort_by_key(|stroke| stroke.kind != LineKind::Hidden);
     strokes
 }
 
-/// Hidden edges, each once where several lie on one another, and not where one that is seen does.
-fn hidden_strokes(
-    judge: &Judge,
-    map: &VisibilityMap,
-    seen: &[Piece],
-    vertices: &[DVec2],
-    grid: &PixelGrid,
-) -> Vec<Stroke> {
-    let mut segments = hidden::segments(judge, map);
-    let hidden = segments.len() as u32;
-    let ends = |piece: &Piece| [piece.from, piece.to].map(|vertex| vertices[vertex as usize]);
-    segments.extend(seen.iter().map(ends));
-    // As polygons of two corners they are cut where they touch one another, so that what coincides has the
-    // same vertices.
-    let polygons: Vec<&[DVec2]> = segments.iter().map(|segment| &segment[..]).collect();
-    let cut = Subdivision::new(&polygons, COINCIDENT);
-    let pieces_of = |segments: std::ops::Range<u32>| {
-        let edges = segments.flat_map(|segment| cut.around(segment));
-        let forth = |edge: u32| {
-            let HalfEdge { from, to, .. } = *cut.half_edge(edge);
-            (from < to).then_some([from, to])
-        };
-        let mut pieces: Vec<[u32; 2]> = edges.filter_map(forth).collect();
-        pieces.sort_unstable();
-        pieces.dedup();
-        pieces
-    };
-    let taken = pieces_of(hidden..segments.len() as u32);
-    let pieces: Vec<Piece> = pieces_of(0..hidden)
-        .into_iter()
-        .filter(|piece| taken.binary_search(piece).is_err())
-        .map(|[from, to]| Piece {
-            kind: LineKind::Hidden,
-            from,
-            to,
-        })
-        .collect();
-    chains(&pieces, &cut.vertices, grid)
+/// How near to one another, in frame heights or widths, lines are one. Larger than the distance within which
+/// fragments are neighbours: where that fails, for a cut at a very flat angle, both would be drawn.
+const ONE_LINE: f64 = 1e-10;
+
+/// Cuts segments where they touch one another, so that what coincides has the same vertices, and keeps of each
+/// piece the first kind: what is seen goes before what is hidden. In order of kind.
+fn each_once(segments: &[(LineKind, [DVec2; 2])]) -> (Vec<Piece>, Vec<DVec2>) {
+    // As polygons of two corners, there and back.
+    let polygons: Vec<&[DVec2]> = segments.iter().map(|segment| &segment.1[..]).collect();
+    let cut = Subdivision::new(&polygons, ONE_LINE);
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (index, &(kind, _)) in (0u32..).zip(segments) {
+        let edges = cut.around(index).map(|edge| *cut.half_edge(edge));
+        let forth = edges.filter(|edge| edge.from < edge.to);
+        pieces.extend(forth.map(|HalfEdge { from, to, .. }| Piece { kind, from, to }));
+    }
+    pieces.sort_by_key(|piece| (piece.from, piece.to, piece.kind));
+    pieces.dedup_by_key(|piece| (piece.from, piece.to));
+    pieces.sort_by_key(|piece| piece.kind);
+    (pieces, cut.vertices)
 }
 
 /// Says what kind of line a side is.
@@ -136,7 +115,8 @@ impl<'a> Judge<'a> {
         let mut face_counts = HashMap::new();
         if wanted.contains(&LineKind::Boundary) {
             // Of all faces if what is hidden may be asked for.
-            let mut faces: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+            let mut faces: Vec<FaceId> =
+                (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
             if wanted.contains(&LineKind::Hidden) {
                 faces = map.faces.ids().collect();
             }

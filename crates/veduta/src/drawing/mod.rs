@@ -11,7 +11,8 @@
 //! 4. `order`: objects as a tree, painted far to near, as an illustrator expects. Regions do not overlap, so
 //!    that any order would do; within an object thin shapes come first.
 //! 5. `trap`: against seams, a shape reaches a little under those painted later.
-//! 6. `lines`: visible edges as strokes, and by `hidden` those that are not.
+//! 6. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
+//! 7. `lines`: visible edges as strokes, and by `hidden` those that are not.
 //!
 //! Outlines are those of the map within 1e-12 of the frame. The result is the same for any number of
 //! threads.
@@ -24,6 +25,7 @@ mod order;
 mod subdivision;
 mod trace;
 mod trap;
+mod veils;
 
 use crate::dice::PixelGrid;
 use crate::scene::{Material, Scene};
@@ -46,6 +48,8 @@ pub struct Look {
     pub radiance: [f32; 3],
     /// Whether it differs from point to point.
     pub evenness: Evenness,
+    /// How much it hides of what is behind, the mean where that differs: 1 for opaque faces.
+    pub opacity: f32,
 }
 
 /// Whether a face has one colour.
@@ -126,6 +130,8 @@ pub struct Drawing {
     pub groups: Vec<Group>,
     /// In the order in which they are painted, which is that of their groups.
     pub shapes: Vec<Shape>,
+    /// Shapes of faces that are not fully opaque, far to near; painted after all others.
+    pub veils: Vec<Veil>,
     /// Painted last: hidden ones, then the others in order of kind.
     pub strokes: Vec<Stroke>,
     /// Names of the scene's materials, by [`MaterialId`].
@@ -178,6 +184,25 @@ pub struct Shape {
     pub farthest: f64,
 }
 
+/// A region of one look that is not fully opaque.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Veil {
+    /// The object.
+    pub object: ObjectId,
+    /// Its name.
+    pub name: String,
+    /// Its material.
+    pub material: MaterialId,
+    /// Radiance (linear Rec.709), not multiplied by the opacity; the mean if it is not even.
+    pub radiance: [f32; 3],
+    /// How much it hides of what is behind it: above 0, up to 1; the mean if it is not even.
+    pub opacity: f32,
+    /// Whether it really has one colour and opacity.
+    pub evenness: Evenness,
+    /// Outlines wound positively and holes the other way.
+    pub outlines: Vec<Vec<DVec2>>,
+}
+
 /// A line, as long as it goes on without a fork.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
@@ -194,7 +219,7 @@ pub struct Stroke {
 /// angles lose four of sixteen digits); more would be seen in areas, which are kept to 1e-9.
 const COINCIDENT: f64 = 1e-12;
 
-/// Draws what is seen: the fragments of `map` with the looks of each, in a picture of `grid`.
+/// Draws what is seen: the fragments of `map` with the looks of each, veils last, in a picture of `grid`.
 ///
 /// `scene` must be the one that the map was made of.
 ///
@@ -207,7 +232,12 @@ pub fn draw(
     grid: &PixelGrid,
     settings: &Settings,
 ) -> Drawing {
-    assert_eq!(looks.len(), map.opaque.len(), "a look for each fragment");
+    assert_eq!(
+        looks.len(),
+        map.fragment_count(),
+        "a look for each fragment"
+    );
+    let (looks, veil_looks) = looks.split_at(map.opaque.len());
     let polygons: Vec<&[DVec2]> = (0..looks.len() as u32)
         .map(|fragment| join::polygon_of(map, fragment))
         .collect();
@@ -218,6 +248,11 @@ pub fn draw(
     } else {
         Default::default()
     };
+    let veils = if settings.shapes {
+        veils::veils(scene, map, veil_looks, grid)
+    } else {
+        Vec::new()
+    };
     let has_traps = settings.trap > 0.0 && !shapes.is_empty();
     Drawing {
         size: [f64::from(grid.width), f64::from(grid.height)],
@@ -227,6 +262,7 @@ pub fn draw(
         }),
         groups,
         shapes,
+        veils,
         strokes,
         material_names: names(&scene.materials),
     }
@@ -268,7 +304,10 @@ fn shapes(
         let of = |region| Outlines::of(subdivision, &region_of, region, grid);
         regions.par_iter().map(of).collect()
     };
-    let thickness: Vec<f64> = outlines.iter().map(|outlines| trap::thickness(&outlines.seen)).collect();
+    let thickness: Vec<f64> = outlines
+        .iter()
+        .map(|outlines| trap::thickness(&outlines.seen))
+        .collect();
     let order::Painting {
         groups,
         order,
@@ -333,11 +372,7 @@ impl Outlines {
 }
 
 /// The fragments of a region, by the parts in which it is seen.
-fn connected_parts(
-    subdivision: &Subdivision,
-    region_of: &[u32],
-    region: &Region,
-) -> Vec<Vec<u32>> {
+fn connected_parts(subdivision: &Subdivision, region_of: &[u32], region: &Region) -> Vec<Vec<u32>> {
     let place = |fragment: u32| region.fragments.binary_search(&fragment);
     let own = region_of[region.fragments[0] as usize];
     let mut taken = vec![false; region.fragments.len()];

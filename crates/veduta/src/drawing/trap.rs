@@ -119,10 +119,7 @@ pub(super) fn thickness(outlines: &[Vec<DVec2>]) -> f64 {
 }
 
 /// Outlines of all that is covered, [`INSET`] within its border.
-pub(super) fn underpainting(
-    subdivision: &Subdivision,
-    grid: &PixelGrid,
-) -> Vec<Vec<DVec2>> {
+pub(super) fn underpainting(subdivision: &Subdivision, grid: &PixelGrid) -> Vec<Vec<DVec2>> {
     let edges = 0..subdivision.half_edges().len() as u32;
     let border: Vec<u32> = edges
         .filter(|&edge| subdivision.across(edge).is_none())
@@ -218,7 +215,14 @@ impl<'a> Trapper<'a> {
         reached.by.resize(self.rank.len(), 0);
         let mut painted = Vec::new();
         for edges in loops {
-            let outline = self.outline(edges, reached);
+            let mut outline = self.outline(edges, reached);
+            let is_repeated = |a: DVec2, b: DVec2| (a - b).length() <= COINCIDENT;
+            outline.dedup_by(|a, b| is_repeated(*a, *b));
+            while let [first, .., last] = outline[..]
+                && is_repeated(first, last)
+            {
+                outline.pop();
+            }
             let corners = trace::corners(&outline, STRAIGHT);
             if !corners.is_empty() {
                 painted.push(corners.into_iter().map(|c| outline[c]).collect());
@@ -343,7 +347,9 @@ impl<'a> Trapper<'a> {
         let mut twin = self.subdivision.half_edge(edge).twin?;
         // A vertex has fewer fragments around it than there are.
         for _ in 0..self.rank.len() {
-            let around = self.subdivision.around(self.subdivision.half_edge(twin).polygon);
+            let around = self
+                .subdivision
+                .around(self.subdivision.half_edge(twin).polygon);
             let count = around.end - around.start;
             let step = if at_end { count - 1 } else { 1 };
             let side = around.start + (twin - around.start + step) % count;
@@ -351,7 +357,9 @@ impl<'a> Trapper<'a> {
                 return None;
             }
             match self.subdivision.half_edge(side).twin {
-                Some(next) if self.rank[self.subdivision.half_edge(next).polygon as usize] > own_rank => {
+                Some(next)
+                    if self.rank[self.subdivision.half_edge(next).polygon as usize] > own_rank =>
+                {
                     twin = next;
                 }
                 _ => {
@@ -396,13 +404,7 @@ impl<'a> Trapper<'a> {
     }
 
     /// Whether nothing but the chain's shape and later ones lies in a zone, and near to it.
-    fn is_free(
-        &self,
-        chain: &Chain,
-        zone: &Zone,
-        distance: f64,
-        reached: &mut Reached,
-    ) -> bool {
+    fn is_free(&self, chain: &Chain, zone: &Zone, distance: f64, reached: &mut Reached) -> bool {
         let own_rank = self.own_rank(chain.sides[0].edges[0]);
         reached.begin();
         for &edge in chain.sides.iter().flat_map(|side| &side.edges) {
@@ -628,7 +630,9 @@ fn hull(points: &[DVec2]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| {
         let (p, q) = (points[a], points[b]);
-        p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(a.cmp(&b))
+        p.x.total_cmp(&q.x)
+            .then(p.y.total_cmp(&q.y))
+            .then(a.cmp(&b))
     });
     order.dedup_by(|a, b| points[*a] == points[*b]);
     let half = |order: &mut dyn Iterator<Item = usize>| {
@@ -687,7 +691,8 @@ fn corners_of(half_planes: &[HalfPlane]) -> Option<Vec<Corner>> {
                 let at = here.at + (there - here.at) * (d_here / (d_here - d_there));
                 let side = if d_here > 0.0 { side } else { here.side };
                 kept.push(Corner { at, side });
-            } else if d_here == 0.0 && d_there < 0.0
+            } else if d_here == 0.0
+                && d_there < 0.0
                 && let Some(last) = kept.last_mut()
             {
                 last.side = side;
@@ -762,7 +767,9 @@ fn outer_border(corners: &[Corner], half_planes: &[HalfPlane]) -> Option<Vec<DVe
     if starts.next().is_some() {
         return None;
     }
-    let length = (0..count).take_while(|&step| is_outer(first + step)).count();
+    let length = (0..count)
+        .take_while(|&step| is_outer(first + step))
+        .count();
     let outer = (0..=length).map(|step| corners[(first + step) % count].at);
     Some(outer.collect())
 }

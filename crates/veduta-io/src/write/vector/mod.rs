@@ -18,7 +18,7 @@ use veduta::drawing::{Drawing, LineKind};
 /// What a drawing is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VectorFormat {
-    /// SVG 1.1: a group with id and title for each object, a path for each shape.
+    /// SVG 1.1: a group with id and title for each object, a path for each shape, the underpainting first.
     #[cfg(feature = "svg")]
     Svg,
     /// PDF 1.7: an optional content group (a layer in viewers) for each object.
@@ -157,6 +157,11 @@ fn encode(format: VectorFormat, drawing: &Drawing, options: &VectorOptions) -> V
 /// 8-bit sRGB of linear light, as in the PNG of the same picture.
 fn srgb8(light: [f32; 3]) -> [u8; 3] {
     light.map(|channel| (srgb_from_linear(channel.clamp(0.0, 1.0)) * 255.0).round() as u8)
+}
+
+/// An opacity in thousandths.
+fn thousandths(opacity: f32) -> i64 {
+    (f64::from(opacity) * 1000.0).round() as i64
 }
 
 /// The name of a kind of lines, for groups.

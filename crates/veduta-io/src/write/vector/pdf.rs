@@ -1,7 +1,8 @@
 use super::outline::{Point, Rounding};
-use super::{VectorOptions, hidden_line, name_of_lines, srgb8};
+use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::{Array, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use veduta::drawing::{Drawing, LineKind, Underpainting};
 use veduta_geometry::DVec2;
@@ -45,6 +46,12 @@ pub fn encode(drawing: &Drawing, options: &VectorOptions) -> Vec<u8> {
         let mut properties = resources.insert(Name(b"Properties")).dict();
         for index in 0..layers.layers.len() {
             properties.pair(Name(resource_name(index).as_bytes()), layer_ref(index));
+        }
+        properties.finish();
+        let mut states = resources.ext_g_states();
+        for opacity in opacities(drawing) {
+            let mut state = states.insert(Name(state_name(opacity).as_bytes())).dict();
+            state.pair(Name(b"ca"), opacity as f32 / 1000.0);
         }
     }
     pdf.stream(stream, &compressed)
@@ -120,6 +127,17 @@ fn resource_name(layer: usize) -> String {
     format!("G{layer}")
 }
 
+/// The opacities of veils, in thousandths.
+fn opacities(drawing: &Drawing) -> BTreeSet<i64> {
+    let veils = drawing.veils.iter();
+    veils.map(|veil| thousandths(veil.opacity)).collect()
+}
+
+/// By which the page's content knows an opacity.
+fn state_name(opacity: i64) -> String {
+    format!("A{opacity}")
+}
+
 fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> String {
     let mut content = Content {
         text: String::new(),
@@ -155,6 +173,9 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
     }
     for _ in open {
         content.text.push_str("EMC\n");
+    }
+    if !drawing.veils.is_empty() {
+        content.veils(drawing, layers);
     }
     if !drawing.strokes.is_empty() {
         content.lines(drawing, options, layers);
@@ -208,6 +229,26 @@ impl Content {
             }
             self.text.push_str("f\n");
         }
+    }
+
+    /// In layers for each stretch of one object: their order is that of depth.
+    fn veils(&mut self, drawing: &Drawing, layers: &mut Layers) {
+        let all = layers.push("veils", None);
+        self.begin_layer(all);
+        self.text.push_str("q\n");
+        for of_object in drawing.veils.chunk_by(|a, b| a.object == b.object) {
+            let layer = layers.push(&of_object[0].name, Some(all));
+            self.begin_layer(layer);
+            for veil in of_object {
+                let name = state_name(thousandths(veil.opacity));
+                self.push(format_args!("/{name} gs\n"));
+                self.shape(&veil.outlines, veil.radiance);
+            }
+            self.text.push_str("EMC\n");
+        }
+        self.text.push_str("Q\nEMC\n");
+        // As it was before.
+        self.fill = None;
     }
 
     fn lines(&mut self, drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) {

@@ -1,5 +1,5 @@
 use super::outline::{Point, Rounding};
-use super::{VectorOptions, hidden_line, name_of_lines, srgb8};
+use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
 use std::collections::HashSet;
 use std::fmt::Write;
 use veduta::drawing::{Drawing, LineKind, Underpainting};
@@ -47,6 +47,9 @@ impl Svg {
             self.text.push_str("\"/>\n");
         }
         self.groups(drawing);
+        if !drawing.veils.is_empty() {
+            self.veils(drawing);
+        }
         if !drawing.strokes.is_empty() {
             self.lines(drawing, options);
         }
@@ -76,6 +79,28 @@ impl Svg {
         for _ in open {
             self.text.push_str("</g>\n");
         }
+    }
+
+    /// In groups for each stretch of one object: their order is that of depth.
+    fn veils(&mut self, drawing: &Drawing) {
+        self.begin_group("veils");
+        for of_object in drawing.veils.chunk_by(|a, b| a.object == b.object) {
+            self.begin_group(&of_object[0].name);
+            for veil in of_object {
+                let rings = self.rounding.rings(&veil.outlines);
+                if !rings.is_empty() {
+                    let color = Color(srgb8(veil.radiance));
+                    let opacity = thousandths(veil.opacity);
+                    self.push(format_args!("<path fill=\"{color}\" fill-opacity=\""));
+                    Rounding::new(3).push(&mut self.text, opacity);
+                    self.text.push_str("\" d=\"");
+                    self.path(&rings, true);
+                    self.text.push_str("\"/>\n");
+                }
+            }
+            self.text.push_str("</g>\n");
+        }
+        self.text.push_str("</g>\n");
     }
 
     fn lines(&mut self, drawing: &Drawing, options: &VectorOptions) {
