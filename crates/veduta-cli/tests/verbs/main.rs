@@ -1,16 +1,19 @@
 //! The verbs, pictures and pipes as users meet them.
 
+mod casters;
 mod check;
 mod deep;
 mod diff;
 mod endings;
 mod examples;
+mod filters;
 mod help;
 mod info;
 mod pictures;
 mod pipes;
 mod preview;
 mod readme;
+mod spans;
 mod stored;
 
 use assert_cmd::Command;

@@ -13,25 +13,48 @@ pub const BAND_ROWS: u32 = 16;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bands {
     grid: PixelGrid,
+    /// From the first row of a band to that of the next.
+    step: u32,
+    /// Rows that a band has in common with the next.
+    overlap: u32,
     fragments: Buckets,
 }
 
 impl Bands {
     /// Sorts the fragments of `map` into the bands of `grid`.
     pub fn new(map: &VisibilityMap, grid: PixelGrid) -> Self {
+        Self::overlapping(map, grid, BAND_ROWS, 0)
+    }
+
+    /// The same with bands that begin every `step` rows, each with `overlap` rows of those that follow.
+    ///
+    /// # Panics
+    /// If `step` is 0, or the grid has no row beyond the overlap.
+    pub fn overlapping(map: &VisibilityMap, grid: PixelGrid, step: u32, overlap: u32) -> Self {
+        assert!(
+            step > 0 && grid.height > overlap,
+            "a band has rows of its own"
+        );
         assert!(
             grid.pixels_per_frame.cmpgt(DVec2::ZERO).all(),
             "a grid's scale is positive"
         );
-        let count = grid.height.div_ceil(BAND_ROWS) as usize;
+        let count = (grid.height - overlap).div_ceil(step);
         let touched: Vec<Range<u32>> = (0..map.fragment_count())
             .into_par_iter()
             .with_min_len(1024)
-            .map(|fragment| bands_touched(map, fragment, &grid))
+            .map(|fragment| {
+                let Some([first, last]) = rows_touched(map, fragment, &grid) else {
+                    return 0..0;
+                };
+                first.saturating_sub(overlap) / step..(last / step + 1).min(count)
+            })
             .collect();
         Self {
             grid,
-            fragments: Buckets::new(count, &touched),
+            step,
+            overlap,
+            fragments: Buckets::new(count as usize, &touched),
         }
     }
 
@@ -52,8 +75,8 @@ impl Bands {
 
     /// Rows of the grid in band `band`.
     pub fn rows(&self, band: usize) -> Range<u32> {
-        let first = band as u32 * BAND_ROWS;
-        first..(first + BAND_ROWS).min(self.grid.height)
+        let first = band as u32 * self.step;
+        first..(first + self.step + self.overlap).min(self.grid.height)
     }
 
     /// Fragments that touch band `band`, ascending: opaque ones, then those of veils.
@@ -62,8 +85,8 @@ impl Bands {
     }
 }
 
-/// The bands that the box around a fragment touches; none if it lies outside the grid.
-fn bands_touched(map: &VisibilityMap, fragment: usize, grid: &PixelGrid) -> Range<u32> {
+/// The first and the last row that the box around a fragment touches; none if it lies outside the grid.
+fn rows_touched(map: &VisibilityMap, fragment: usize, grid: &PixelGrid) -> Option<[u32; 2]> {
     let polygon = map.polygon(map.fragment(fragment));
     let mut min = polygon[0];
     let mut max = polygon[0];
@@ -75,9 +98,9 @@ fn bands_touched(map: &VisibilityMap, fragment: usize, grid: &PixelGrid) -> Rang
     let max = grid.pixels_from_image(max);
     let (width, height) = (f64::from(grid.width), f64::from(grid.height));
     if min.x >= width || max.x <= 0.0 || min.y >= height || max.y <= 0.0 {
-        return 0..0;
+        return None;
     }
     let first = min.y.max(0.0) as u32;
     let last = max.y.min(height - 1.0) as u32;
-    first / BAND_ROWS..last / BAND_ROWS + 1
+    Some([first, last])
 }
