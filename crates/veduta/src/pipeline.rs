@@ -1,10 +1,15 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
-//! the light and `pipeline/deep.rs` for deep pictures.
+//! the light, `pipeline/deep.rs` for deep pictures, `pipeline/frames.rs` for animations and
+//! `pipeline/local.rs` for parts of pictures.
 
 mod aovs;
 mod deep;
+mod frames;
+mod local;
 
 pub use deep::render_deep;
+pub use frames::{Extent, FrameStep, FrameWork, Frames};
+pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};

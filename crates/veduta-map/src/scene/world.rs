@@ -50,12 +50,21 @@ impl Scene {
         for layer in self.layers.iter().filter(|layer| !keep(layer)) {
             kept[layer.objects.start as usize..layer.objects.end as usize].fill(false);
         }
+        self.layers.retain(&keep);
+        self.keep_objects(|object| kept[object.index()]);
+    }
+
+    /// Leaves out all objects but those that `keep` accepts. Layers stay, if need be without objects.
+    ///
+    /// Meshes, materials, cameras and lights stay as they are.
+    pub fn keep_objects(&mut self, keep: impl Fn(ObjectId) -> bool) {
+        let kept = (0..self.objects.len()).map(|index| keep(ObjectId::from_index(index)));
+        let kept: Vec<bool> = kept.collect();
         // How many stay before each object.
         let mut before = vec![0; kept.len() + 1];
         for (index, &is_kept) in kept.iter().enumerate() {
             before[index + 1] = before[index] + u32::from(is_kept);
         }
-        self.layers.retain(&keep);
         for layer in &mut self.layers {
             let moved = |end: u32| before[end as usize];
             layer.objects = moved(layer.objects.start)..moved(layer.objects.end);

@@ -19,6 +19,30 @@ pub struct Bands {
 impl Bands {
     /// Sorts the opaque fragments of `map` into the bands of `grid`.
     pub fn new(map: &VisibilityMap, grid: PixelGrid) -> Self {
+        Self::of_fragments(map, grid, |_| true)
+    }
+
+    /// The same for the fragments that `wanted` accepts.
+    pub fn of_fragments(
+        map: &VisibilityMap,
+        grid: PixelGrid,
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
+        Self::sorted(map, grid, [0..grid.width, 0..grid.height], wanted)
+    }
+
+    /// The same for the fragments that may touch a pixel in these columns and rows. Other bands than
+    /// those of the rows have none.
+    pub fn within(map: &VisibilityMap, grid: PixelGrid, bounds: [Range<u32>; 2]) -> Self {
+        Self::sorted(map, grid, bounds, |_| true)
+    }
+
+    fn sorted(
+        map: &VisibilityMap,
+        grid: PixelGrid,
+        bounds: [Range<u32>; 2],
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
         assert!(
             grid.pixels_per_frame.cmpgt(DVec2::ZERO).all(),
             "a grid's scale is positive"
@@ -27,7 +51,13 @@ impl Bands {
         let touched: Vec<Range<u32>> = (0..map.opaque.len())
             .into_par_iter()
             .with_min_len(1024)
-            .map(|fragment| bands_touched(map, &map.opaque, fragment, &grid))
+            .map(|fragment| {
+                if wanted(fragment) {
+                    bands_touched(map, &map.opaque, fragment, &grid, &bounds)
+                } else {
+                    0..0
+                }
+            })
             .collect();
         Self {
             grid,
@@ -62,12 +92,14 @@ impl Bands {
     }
 }
 
-/// The bands that the box around a fragment touches; none if it lies outside the grid.
+/// The bands in which the box around a fragment touches the columns and rows of `bounds`, which are
+/// some of the grid's.
 fn bands_touched(
     map: &VisibilityMap,
     fragments: &Fragments,
     fragment: usize,
     grid: &PixelGrid,
+    [columns, rows]: &[Range<u32>; 2],
 ) -> Range<u32> {
     let polygon = map.polygon(fragments.get(fragment));
     let mut min = polygon[0];
@@ -78,11 +110,12 @@ fn bands_touched(
     }
     let min = grid.pixels_from_image(min);
     let max = grid.pixels_from_image(max);
-    let (width, height) = (f64::from(grid.width), f64::from(grid.height));
-    if min.x >= width || max.x <= 0.0 || min.y >= height || max.y <= 0.0 {
+    let [left, right] = [columns.start, columns.end].map(f64::from);
+    let [top, bottom] = [rows.start, rows.end].map(f64::from);
+    if min.x >= right || max.x <= left || min.y >= bottom || max.y <= top {
         return 0..0;
     }
-    let first = min.y.max(0.0) as u32;
-    let last = max.y.min(height - 1.0) as u32;
+    let first = min.y.max(top) as u32;
+    let last = max.y.min(bottom - 1.0) as u32;
     first / BAND_ROWS..last / BAND_ROWS + 1
 }
