@@ -37,8 +37,8 @@ pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, source_o
     feature = "toml"
 ))]
 pub use read::{
-    Detail, ErrorKind, Excerpt, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES,
-    UpAxis, Warning, read_scene,
+    Animation, AnimationKind, Detail, ErrorKind, Excerpt, Loaded, Moment, Place, Problem,
+    ReadError, ReadOptions, SCENE_SUFFIXES, SceneOverTime, UpAxis, Warning, read_scene,
 };
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};
