@@ -5,6 +5,7 @@ mod deep;
 mod diff;
 mod endings;
 mod examples;
+mod frames;
 mod help;
 mod info;
 mod pictures;

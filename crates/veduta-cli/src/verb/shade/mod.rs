@@ -1,5 +1,7 @@
 //! `veduta shade`: pixels of a stored map, at any scale and in other colours.
 
+mod into;
+
 use super::look::Look;
 use super::output::Output;
 use super::stored::{Changes, open, tell_work};
@@ -9,6 +11,7 @@ use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::Args;
+use into::Into;
 use std::path::PathBuf;
 use veduta::dice::PixelGrid;
 use veduta::drawing::LineKind;
@@ -39,6 +42,8 @@ pub struct Shade {
     strict: bool,
 
     #[command(flatten)]
+    local: Into,
+    #[command(flatten)]
     changes: Changes,
     #[command(flatten)]
     output: Output,
@@ -56,6 +61,9 @@ Examples:
       veduta shade town.veduta --scale 4 -o large.png
   A part of it, as through a magnifying glass:
       veduta shade town.veduta --scale 9 --window 3000,2000,320,240 -o part.png
+  Some objects anew, in a picture that is there:
+      veduta shade town.veduta -o a.exr
+      veduta shade town.veduta --unlit --into a.exr --objects wall -o b.exr
   With what was red in another colour:
       veduta shade town.veduta --set 'material.\"red\".color=#446' -o slate.png
 ";
@@ -90,21 +98,19 @@ impl Shade {
             let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         }
+        if let Some(old) = &self.local.into {
+            let Some(target) = &pixels else {
+                let message = "a vector picture is made as a whole; leave --into out";
+                return Err(Failure::new(Code::Usage, message));
+            };
+            return self.run_into(old, target, json, talk);
+        }
         talk.begin("reading");
         let mut map = open(&self.map)?;
-        let [width, height] = map.reader().size();
-        let frame = match self.size {
-            Some(size) => DVec2::new(size.width.into(), size.height.into()),
-            None => DVec2::new(width.into(), height.into()) * self.scale.unwrap_or(DVec2::ONE),
-        };
+        let frame = self.frame(map.reader().size());
         let (left_top, size) = match self.window {
             Some(window) => (window.left_top, window.size),
-            None => {
-                let pixels = frame.round().max(DVec2::ONE);
-                let size = Size::new(pixels.x as u64, pixels.y as u64);
-                let size = size.map_err(|problem| Failure::new(Code::Usage, problem))?;
-                (DVec2::ZERO, size)
-            }
+            None => (DVec2::ZERO, whole_size(frame)?),
         };
         if let Some(target) = &pixels {
             target.refuse_size(size)?;
@@ -169,4 +175,20 @@ impl Shade {
         }
         Ok(())
     }
+
+    /// Width and height of the frame in pixels, with fractions.
+    fn frame(&self, of_map: [u32; 2]) -> DVec2 {
+        let [width, height] = of_map.map(f64::from);
+        match self.size {
+            Some(size) => DVec2::new(size.width.into(), size.height.into()),
+            None => DVec2::new(width, height) * self.scale.unwrap_or(DVec2::ONE),
+        }
+    }
+}
+
+/// The size of a picture that shows all of a frame.
+fn whole_size(frame: DVec2) -> Result<Size, Failure> {
+    let pixels = frame.round().max(DVec2::ONE);
+    let size = Size::new(pixels.x as u64, pixels.y as u64);
+    size.map_err(|problem| Failure::new(Code::Usage, problem))
 }
