@@ -11,7 +11,7 @@
 //!    all layers at once.
 //!
 //! Through another camera everything is seen otherwise, and all is found at once. So it is where most
-//! of the faces have changed, since compositing then costs more than it saves ([`MOST_CHANGED`]).
+//! has changed, since compositing then costs more than it saves ([`MOST_CHANGED`]).
 
 mod same;
 
@@ -19,13 +19,14 @@ use super::find_visibility;
 use crate::composite::composite;
 use crate::scene::Scene;
 use same::Comparison;
+use std::collections::HashSet;
 use std::ops::Range;
 use veduta_map::{Camera, ObjectId, SeenScene};
 
-/// Share of the scene's faces that may change where the rest is kept. Composites cost about half of
-/// finding all (docs/performance.md), and finding goes with the faces. With a larger share frames
-/// would cost more than they do at once; with a smaller one large parts that move were found with
-/// those that stand.
+/// Share of the scene's faces, and of the fragments that were seen, that may change where the rest is
+/// kept. Finding goes with both: few faces that pierce one another cost as much as many that do not. A
+/// composite costs up to half of finding all (docs/performance.md), so that with a larger share frames
+/// would cost more than at once; with a smaller one more is found that stands.
 const MOST_CHANGED: f64 = 0.5;
 
 /// Layers that all move at times of their own would each become a part, and a composite of very many
@@ -145,7 +146,12 @@ impl Frames {
                         found: Vec::new(),
                     };
                     return (last.relit(), work);
-                } else if changed_share(&scene, &units, &changed) > MOST_CHANGED {
+                } else if changed_share(&scene, &units, &changed).max(seen_share(
+                    last.seen(),
+                    &units,
+                    &changed,
+                )) > MOST_CHANGED
+                {
                     (Extent::MostChanged, changed, Vec::new())
                 } else {
                     let seen = last.seen.into_iter().map(Some);
@@ -203,6 +209,11 @@ impl Last {
         same.map(|same| !same).collect()
     }
 
+    /// All that was seen.
+    fn seen(&self) -> &SeenScene {
+        self.composite.as_ref().unwrap_or(&self.seen[0])
+    }
+
     /// All that is seen, with the lights that the scene has now.
     fn relit(&mut self) -> &SeenScene {
         let seen = match &mut self.composite {
@@ -220,15 +231,11 @@ fn units_of(scene: &Scene) -> Vec<Unit> {
     let mut object = 0;
     let count = scene.objects.len() as u32;
     while object < count {
-        let unit = match scene.layer_of(ObjectId(object)) {
-            Some(layer) => Unit {
-                name: layer.name.clone(),
-                objects: layer.objects.clone(),
-            },
-            None => Unit {
-                name: scene.objects[object as usize].name.clone(),
-                objects: object..object + 1,
-            },
+        let id = ObjectId(object);
+        let layer = scene.layer_of(id);
+        let unit = Unit {
+            name: unit_name(scene, id).to_owned(),
+            objects: layer.map_or(object..object + 1, |layer| layer.objects.clone()),
         };
         object = unit.objects.end;
         units.push(unit);
@@ -251,6 +258,27 @@ fn changed_share(scene: &Scene, units: &[Unit], changed: &[bool]) -> f64 {
         of_changed += if has_changed { faces } else { 0 };
     }
     of_changed as f64 / of_all.max(1) as f64
+}
+
+/// The fragments of changed units as a share of all that was seen.
+fn seen_share(seen: &SeenScene, units: &[Unit], changed: &[bool]) -> f64 {
+    let changed = units.iter().zip(changed).filter(|row| *row.1);
+    let names: HashSet<&str> = changed.map(|(unit, _)| unit.name.as_str()).collect();
+    let objects = (0..seen.scene.objects.len()).map(ObjectId::from_index);
+    let has_changed: Vec<bool> = objects
+        .map(|object| names.contains(unit_name(&seen.scene, object)))
+        .collect();
+    let fragments = &seen.map.opaque;
+    let of_changed = fragments
+        .iter()
+        .filter(|fragment| has_changed[seen.map.faces.object(fragment.face()).index()]);
+    of_changed.count() as f64 / fragments.len().max(1) as f64
+}
+
+/// The name of an object's layer, or its own if it is of none.
+fn unit_name(scene: &Scene, object: ObjectId) -> &str {
+    let layer = scene.layer_of(object);
+    layer.map_or(&scene.object(object).name, |layer| &layer.name)
 }
 
 fn face_count(scene: &Scene, unit: &Unit) -> usize {
