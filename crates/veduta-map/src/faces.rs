@@ -113,6 +113,13 @@ impl Faces {
         !self.veil.is_empty() && self.veil[face.index()]
     }
 
+    /// Whether `face` is seen where it lies in one plane with `other`: a veil before an opaque face, so that
+    /// a decal is seen on its wall; otherwise the smaller id.
+    #[inline(always)]
+    pub fn wins_tie(&self, face: FaceId, other: FaceId) -> bool {
+        (!self.is_veil(face), face) < (!self.is_veil(other), other)
+    }
+
     /// Appends all of `other`, in its order, with planes of its own.
     pub fn append(&mut self, other: &Faces) {
         if self.outline_start.is_empty() {

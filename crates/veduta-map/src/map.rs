@@ -62,6 +62,36 @@ pub enum Invariant {
 const ROUNDING: f64 = 1e-12;
 
 impl VisibilityMap {
+    /// Number of fragments, veils included.
+    pub fn fragment_count(&self) -> usize {
+        self.opaque.len() + self.veils.len()
+    }
+
+    /// Fragment `index`, where those of veils are numbered after all opaque ones.
+    #[inline]
+    pub fn fragment(&self, index: usize) -> Fragment<'_> {
+        match index.checked_sub(self.opaque.len()) {
+            None => self.opaque.get(index),
+            Some(veil) => self.veils.get(veil),
+        }
+    }
+
+    /// The face of [fragment](VisibilityMap::fragment) `index`.
+    #[inline]
+    pub fn face_of(&self, index: usize) -> FaceId {
+        match index.checked_sub(self.opaque.len()) {
+            None => self.opaque.face(index),
+            Some(veil) => self.veils.face(veil),
+        }
+    }
+
+    /// The faces of all fragments: of opaque ones, ascending, then of veils, ascending.
+    pub fn shown_faces(&self) -> Vec<FaceId> {
+        (0..self.fragment_count())
+            .map(|index| self.face_of(index))
+            .collect()
+    }
+
     /// The polygon of a fragment, whole faces included.
     #[inline]
     pub fn polygon<'a>(&'a self, fragment: Fragment<'a>) -> &'a [DVec2] {

@@ -12,9 +12,9 @@ pub use frames::{Extent, FrameStep, FrameWork, Frames};
 pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
-use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer};
+use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer, VeilBuffers};
 use crate::drawing::{self, Drawing, Evenness, Look};
-use crate::scene::{AlphaMode, Scene};
+use crate::scene::{Opacities, Opacity, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
 use crate::visibility::multiscan::{self, Spans};
@@ -67,9 +67,10 @@ pub enum Sampling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Shortcoming {
-    /// The material is not fully opaque but was drawn so.
+    /// The material is not fully opaque but was drawn so: it was made transparent after the map had been
+    /// found, which does not know what is behind.
     DrawnOpaque(MaterialId),
-    /// This many fragments of faces that are not fully opaque were left out.
+    /// This many faces or fragments that are not fully opaque were left out.
     VeilsLeftOut(usize),
 }
 
@@ -233,7 +234,7 @@ impl Canvas {
         unlit: bool,
         first_row: usize,
     ) {
-        let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+        let shown = map.shown_faces();
         let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
         let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
         let maker = self.maker(scene, textures, camera, faces, &shown);
@@ -246,7 +247,8 @@ impl Canvas {
             let BandBuffers { dicer, parts, .. } = buffers;
             dice::dice(map, &bands, band, varies, dicer, parts);
         };
-        self.paint(&surfaces, maker.as_ref(), grid, first_row, dice);
+        let veiled = (!map.veils.is_empty()).then_some(map);
+        self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
     }
 
     /// What makes the channels beside the light, if there are any.
@@ -263,11 +265,13 @@ impl Canvas {
             .then(|| AovMaker::new(scene, textures, camera, faces, shown, settings))
     }
 
-    /// Makes the bands of `grid` from their parts, which `dice` finds.
+    /// Makes the bands of `grid` from their parts, which `dice` finds; of the map `veiled` if there are
+    /// veils among them.
     fn paint(
         &mut self,
         surfaces: &Surfaces,
         maker: Option<&AovMaker>,
+        veiled: Option<&VisibilityMap>,
         grid: &PixelGrid,
         first_row: usize,
         dice: impl Fn(usize, &mut BandBuffers) + Sync,
@@ -282,7 +286,7 @@ impl Canvas {
             |buffers, (band, light)| {
                 dice(band, buffers);
                 let row = band as u32 * BAND_ROWS;
-                buffers.finish(surfaces, grid, row, light);
+                buffers.finish(surfaces, veiled, grid, row, light);
                 if let Some(maker) = maker {
                     let (parts, aov_buffers) = (&buffers.parts, &mut buffers.aovs);
                     let part = maker.make(parts, grid, row, light.len(), aov_buffers);
@@ -310,10 +314,10 @@ pub fn draw_window(
     drawing::draw(scene, map, &looks, grid, settings)
 }
 
-/// What each fragment looks like; the same for all of a face.
+/// What each opaque fragment looks like; the same for all of a face.
 fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Vec<Look> {
     let textures = Textures::new(scene, &materials_seen(scene, map));
-    let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+    let shown = map.shown_faces();
     let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
     // Of each fragment that is not even: the sum of area times radiance, and of area.
@@ -332,7 +336,7 @@ fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> V
         }
     }
     let mut looks = Vec::with_capacity(shown.len());
-    for fragments in shown.chunk_by(|a, b| a == b) {
+    for fragments in shown[..map.opaque.len()].chunk_by(|a, b| a == b) {
         let first = looks.len();
         let mut sum = [0.0; 4];
         for of_fragment in &sums[first..first + fragments.len()] {
@@ -398,12 +402,15 @@ fn render_spans(
         let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
         dice::dice_spans(spans, rows, fragment_of, dicer, parts);
     };
-    canvas.paint(&surfaces, maker.as_ref(), &grid, 0, dice);
+    canvas.paint(&surfaces, maker.as_ref(), None, &grid, 0, dice);
     let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
     Rendered {
         picture: canvas.picture,
         aovs: canvas.aovs,
-        shortcomings: shortcomings_of(scene, materials, veils),
+        shortcomings: (veils > 0)
+            .then_some(Shortcoming::VeilsLeftOut(veils))
+            .into_iter()
+            .collect(),
     }
 }
 
@@ -430,8 +437,6 @@ fn render_strips(
     let textures = Textures::new(scene, &in_view.collect());
 
     let mut canvas = Canvas::new(&frame, settings.aovs);
-    let mut seen = BTreeSet::new();
-    let mut veils = 0;
     for strip in 0..count {
         begin(Step::Strip {
             index: strip,
@@ -441,13 +446,12 @@ fn render_strips(
         let [first, end] = [rows[strip], rows[strip + 1]];
         let grid = frame.window(0.0, first as f64, frame.width, (end - first) as u32);
         canvas.paint_map(scene, &textures, &map, &grid, settings.unlit, first);
-        seen.extend(materials_seen(scene, &map));
-        veils += map.veils.len();
     }
+    // What is found from the scene itself is shown as it is.
     Rendered {
         picture: canvas.picture,
         aovs: canvas.aovs,
-        shortcomings: shortcomings_of(scene, seen, veils),
+        shortcomings: Vec::new(),
     }
 }
 
@@ -457,6 +461,7 @@ struct BandBuffers {
     dicer: Dicer,
     span_dicer: SpanDicer,
     parts: Parts,
+    veils: VeilBuffers,
     radiance: Radiance,
     sums: Vec<[f64; 4]>,
     aovs: AovBuffers,
@@ -501,15 +506,21 @@ impl BandBuffers {
         of_fragments.map(sum_up).collect()
     }
 
-    /// Shades the parts of a band that begins at `first_row`, and sums them up.
+    /// Shades the parts of a band that begins at `first_row`, puts the veils of the map `veiled` before
+    /// them, and sums them up.
     fn finish(
         &mut self,
         surfaces: &Surfaces,
+        veiled: Option<&VisibilityMap>,
         grid: &PixelGrid,
         first_row: u32,
         pixels: &mut [[f32; 4]],
     ) {
         surfaces.shade(&self.parts, grid, first_row, &mut self.radiance);
+        if let Some(map) = veiled {
+            let (opacities, parts) = (&self.radiance.opacities, &mut self.parts);
+            dice::attenuate(map, grid, first_row, opacities, &mut self.veils, parts);
+        }
         accumulate::box_filter(&self.parts, &self.radiance, &mut self.sums, pixels);
     }
 }
@@ -520,30 +531,32 @@ fn material_of(scene: &Scene, faces: &Faces, face: FaceId) -> MaterialId {
 }
 
 fn materials_seen(scene: &Scene, map: &VisibilityMap) -> BTreeSet<MaterialId> {
-    (0..map.opaque.len())
-        .map(|fragment| material_of(scene, &map.faces, map.opaque.face(fragment)))
+    (0..map.fragment_count())
+        .map(|fragment| material_of(scene, &map.faces, map.face_of(fragment)))
         .collect()
 }
 
 /// What [`render_map`] does not show as it should, in ascending order.
 pub fn shortcomings(scene: &Scene, map: &VisibilityMap) -> Vec<Shortcoming> {
-    shortcomings_of(scene, materials_seen(scene, map), map.veils.len())
-}
-
-fn shortcomings_of(scene: &Scene, seen: BTreeSet<MaterialId>, veils: usize) -> Vec<Shortcoming> {
-    let drawn_opaque = seen
-        .into_iter()
-        .filter(|&id| scene.material(id).alpha_mode != AlphaMode::Opaque)
-        .map(Shortcoming::DrawnOpaque);
+    let opacities = Opacities::of(scene);
+    let opaque = (0..map.opaque.len()).map(|fragment| map.opaque.face(fragment));
+    let drawn_opaque: BTreeSet<MaterialId> = opaque
+        .filter(|&face| {
+            let (object, source) = (map.faces.object(face), map.faces.source(face));
+            opacities.of_face(object, source) != Opacity::Opaque
+        })
+        .map(|face| material_of(scene, &map.faces, face))
+        .collect();
     drawn_opaque
-        .chain((veils > 0).then_some(Shortcoming::VeilsLeftOut(veils)))
+        .into_iter()
+        .map(Shortcoming::DrawnOpaque)
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Image, ImageId, Material, Mesh, MeshId, Object, TextureRef};
+    use crate::scene::{AlphaMode, Image, ImageId, Material, Mesh, MeshId, Object, TextureRef};
     use veduta_geometry::{DMat4, DVec2, DVec3, Vec2, Vec3};
     use veduta_map::{Affine, Fragments, ObjectId, Projection};
 
@@ -975,16 +988,35 @@ mod tests {
     }
 
     #[test]
-    fn materials_that_are_drawn_as_they_are_not_are_named() {
-        let material = Material {
-            alpha_mode: AlphaMode::Mask(0.5),
+    fn a_material_made_transparent_after_its_map_was_found_is_named() {
+        let opaque = scene_of(ground(2.0, 2), Material::default());
+        let map = flat_map_of(&opaque, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
+        assert_eq!(shortcomings(&opaque, &map), []);
+        let mut changed = opaque.clone();
+        changed.materials[0].base_color[3] = 0.5;
+        assert_eq!(shortcomings(&changed, &map), [], "opacity is ignored");
+        changed.materials[0].alpha_mode = AlphaMode::Blend;
+        let named = [Shortcoming::DrawnOpaque(MaterialId(0))];
+        assert_eq!(shortcomings(&changed, &map), named);
+    }
+
+    #[test]
+    fn multiscan_tells_that_it_leaves_veils_out() {
+        let glass = Material {
+            base_color: [1.0, 1.0, 1.0, 0.5],
+            alpha_mode: AlphaMode::Blend,
             ..Material::default()
         };
-        let scene = scene_of(ground(2.0, 2), material);
-        let map = flat_map_of(&scene, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));
-        let found = shortcomings(&scene, &map);
-        assert_eq!(found, [Shortcoming::DrawnOpaque(MaterialId(0))]);
-        let opaque = scene_of(ground(2.0, 2), Material::default());
-        assert_eq!(shortcomings(&opaque, &map), []);
+        let scene = scene_of(ground(2.0, 1), glass);
+        let camera = perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0);
+        let made = |sampling| {
+            let settings = RenderSettings {
+                sampling,
+                ..unlit(20, 20)
+            };
+            render(&scene, &camera, &settings, |_| {}).shortcomings
+        };
+        assert_eq!(made(Sampling::Exact), []);
+        assert_eq!(made(Sampling::Multiscan(2)), [Shortcoming::VeilsLeftOut(2)]);
     }
 }

@@ -5,7 +5,7 @@ use veduta::dice::{Coverage, PixelGrid, coverage};
 use veduta::map::{Camera, SeenScene};
 use veduta::pipeline::{Extent, Frames, find_visibility, render_window};
 use veduta::scene::generate::by_name;
-use veduta::scene::{Layer, MeshId, Object, Scene};
+use veduta::scene::{AlphaMode, Layer, MeshId, Object, Scene};
 use veduta_geometry::{DMat4, DVec3};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -134,6 +134,34 @@ fn a_frame_of_kept_and_moved_layers_is_the_frame_found_as_a_whole() {
             .iter()
             .filter(|layer| !layer.objects.is_empty());
         assert!(layers.count() >= 3, "layers are seen among one another");
+    }
+}
+
+#[test]
+fn veils_that_move_and_veils_that_stand_are_seen_through_one_another() {
+    let (mut scene, camera) = layered(&["pierce", "balls3", "balls7"]);
+    for layer in [0, 1] {
+        for row in scene.layers[layer].objects.clone() {
+            let mesh = &scene.meshes[scene.objects[row as usize].mesh.0 as usize];
+            for &(_, material) in &mesh.materials {
+                let material = &mut scene.materials[material.index()];
+                material.base_color[3] = 0.6;
+                material.alpha_mode = AlphaMode::Blend;
+            }
+        }
+    }
+    let mut frames = Frames::new(SIZE);
+    for frame in 0..3 {
+        let (seen, work) = frames.next(scene.clone(), &camera, |_| {});
+        let expected = if frame == 0 {
+            Extent::First
+        } else {
+            Extent::Parts
+        };
+        assert_eq!(work.extent, expected);
+        assert!(!seen.map.veils.is_empty());
+        assert_is_whole(seen, &scene, &camera, &format!("frame {frame}"));
+        move_layer(&mut scene, 0, DVec3::new(0.05, 0.02, -0.03));
     }
 }
 

@@ -4,8 +4,8 @@ use veduta::accumulate::Picture;
 use veduta::dice::{PixelGrid, Region};
 use veduta::map::VisibilityMap;
 use veduta::pipeline::{find_visibility, render_region, render_window};
-use veduta::scene::Scene;
 use veduta::scene::generate::by_name;
+use veduta::scene::{AlphaMode, Scene};
 
 /// A stretched grid, so that no pixel's border is a border of the frame's by chance.
 fn grid() -> PixelGrid {
@@ -38,9 +38,17 @@ fn blank(grid: &PixelGrid) -> Picture {
 
 #[test]
 fn windows_made_again_are_the_whole_picture_there_and_nothing_elsewhere() {
-    // Flat colours, and colours that go over each face.
-    for name in ["bridge", "pierce", "field100k"] {
-        let (scene, map) = seen(name);
+    // Flat colours, veils, and colours that go over each face.
+    for (name, opacity) in [("bridge", 1.0), ("pierce", 0.4), ("field100k", 1.0)] {
+        let (mut scene, mut map) = seen(name);
+        if opacity < 1.0 {
+            scene.materials.iter_mut().for_each(|material| {
+                material.base_color[3] = opacity;
+                material.alpha_mode = AlphaMode::Blend;
+            });
+            map = find_visibility(&scene, &map.camera);
+            assert!(!map.veils.is_empty());
+        }
         let grid = grid();
         let whole = render_window(&scene, &map, &grid, false);
         let windows = [

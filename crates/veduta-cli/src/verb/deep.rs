@@ -6,7 +6,7 @@ use crate::exit::Failure;
 use crate::talk::Talk;
 use std::io;
 use veduta::map::Camera;
-use veduta::pipeline::{self, RenderSettings, Shortcoming};
+use veduta::pipeline::{self, RenderSettings};
 use veduta::scene::Scene;
 use veduta_io::deep_exr::{
     DeepCompression, DeepPicture, DeepSink, ObjectIds, stream_deep_picture, write_deep_picture,
@@ -21,18 +21,15 @@ pub struct DeepTarget<'a> {
     pub samples: Samples,
 }
 
-/// How many samples were written, and what the picture does not show as it should.
-type Written = (u64, Vec<Shortcoming>);
-
 impl DeepTarget<'_> {
-    /// Makes the picture there.
+    /// Makes the picture there; returns how many samples were written.
     pub fn write(
         &self,
         scene: &Scene,
         camera: &Camera,
         settings: &RenderSettings,
         talk: &mut Talk,
-    ) -> Result<Written, Failure> {
+    ) -> Result<u64, Failure> {
         let names = scene.objects.iter().map(|object| object.name.as_str());
         let picture = DeepPicture {
             width: settings.width,
@@ -42,11 +39,11 @@ impl DeepTarget<'_> {
             samples: self.samples,
             compression: self.compression,
         };
-        let make = |sink: &mut DeepSink| -> Result<Written, WriteProblem> {
+        let make = |sink: &mut DeepSink| -> Result<u64, WriteProblem> {
             let begin = |step| tell_step(step, talk);
             let write = |rows: &_| sink.write(rows);
-            let shortcomings = pipeline::render_deep(scene, camera, settings, begin, write)?;
-            Ok((sink.samples_written(), shortcomings))
+            pipeline::render_deep(scene, camera, settings, begin, write)?;
+            Ok(sink.samples_written())
         };
         match self.target.file() {
             Some(path) => Ok(write_deep_picture(path, &picture, make)?),

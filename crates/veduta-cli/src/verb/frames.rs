@@ -16,7 +16,9 @@ use veduta::dice::PixelGrid;
 use veduta::map::Camera;
 use veduta::map::file::Source;
 use veduta::pipeline::{self, Extent, FrameStep, FrameWork};
-use veduta_io::{Layers, Loaded, Moment, ReadOptions, SceneOverTime, is_map, source_of, write_map};
+use veduta_io::{
+    Layers, Loaded, Moment, ReadOptions, SceneOverTime, VectorFormat, is_map, source_of, write_map,
+};
 
 /// Make the pictures of an animation
 ///
@@ -200,6 +202,11 @@ impl Frames {
         talk: &mut Talk,
     ) -> Result<Run<'a>, Failure> {
         let (camera, size) = self.view.camera(&self.model, loaded, self.size)?;
+        if VectorFormat::of(names.pattern).is_some() {
+            let message = "frames are pictures of pixels, or maps; draw one at a time by \
+                veduta render --frame N";
+            return Err(Failure::new(Code::Usage, message));
+        }
         let makes_maps = is_map(names.pattern);
         if makes_maps && self.output.has_layers() {
             let message = "a map is of no picture: --aov is not for .veduta";

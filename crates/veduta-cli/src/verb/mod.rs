@@ -168,7 +168,10 @@ fn tell_shortcomings(
         let message = match shortcoming {
             Shortcoming::DrawnOpaque(material) => {
                 let name = &scene.material(*material).name;
-                format!("{file}: the material {name:?} is not opaque, but drawn so")
+                format!(
+                    "{file}: the material {name:?} is not opaque any more, but drawn so: what is \
+                     behind is not in the map; make the map of a scene with that material"
+                )
             }
             Shortcoming::VeilsLeftOut(count) => {
                 format!("{file}: {count} pieces of surfaces that are not opaque are left out")

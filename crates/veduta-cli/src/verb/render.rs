@@ -269,9 +269,8 @@ impl Render {
             unlit: self.look.unlit,
             ..RenderSettings::default()
         };
-        let (samples, shortcomings) = target.write(scene, camera, &settings, talk)?;
+        let samples = target.write(scene, camera, &settings, talk)?;
         talk.end();
-        tell_shortcomings(&self.model, scene, &shortcomings, self.strict, talk)?;
         talk.detail(format_args!(
             "{} faces, {samples} samples",
             scene.face_count()

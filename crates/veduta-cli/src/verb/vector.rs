@@ -14,7 +14,7 @@ use veduta::accumulate::Picture;
 use veduta::dice::PixelGrid;
 use veduta::drawing::{self, Drawing, Evenness, LineKind, Shape};
 use veduta::map::VisibilityMap;
-use veduta::pipeline;
+use veduta::pipeline::{self, Shortcoming};
 use veduta::scene::Scene;
 use veduta_io::{VectorFormat, VectorOptions, WriteProblem, stream_drawing, write_drawing};
 
@@ -148,7 +148,10 @@ impl Vector {
             strict,
         } = *subject;
         let background = development.plain_background()?;
-        let shortcomings = pipeline::shortcomings(scene, map);
+        let mut shortcomings = pipeline::shortcomings(scene, map);
+        if !map.veils.is_empty() {
+            shortcomings.push(Shortcoming::VeilsLeftOut(map.veils.len()));
+        }
         tell_shortcomings(file, scene, &shortcomings, strict, talk)?;
         talk.begin("drawing");
         let mut drawing = pipeline::draw_window(scene, map, grid, unlit, settings);

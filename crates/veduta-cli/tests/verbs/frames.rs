@@ -136,7 +136,7 @@ fn frames_that_cannot_be_are_refused() {
             2,
             "frame 1 comes before",
         ),
-        ("frames s.toml -o f.#.svg", 2, "f.#.svg"),
+        ("frames s.toml -o f.#.svg", 2, "render --frame N"),
         ("frames s.toml -o f.#.exr --aov object", 2, "crypto-object"),
         ("frames s.toml -o nowhere/f.#.png", 6, "make it first"),
         ("frames still.toml -o f.#.png", 4, "nothing moves"),

@@ -131,13 +131,15 @@ impl DeepFilter {
     ) {
         self.seen.clear();
         let place = |pixel: u32| (pixel % grid.width, first_row + pixel / grid.width);
-        for (part, light) in parts.boundary.iter().zip(&radiance.boundary) {
+        // An area that single precision rounds to nothing, or that veils hide, is nothing.
+        let boundary = parts.boundary.iter().zip(&radiance.boundary);
+        for (part, light) in boundary.filter(|(part, _)| part.area > 0.0) {
             let (column, row) = place(part.pixel);
             let area = f64::from(part.area);
             let range = self.depths.of_part(map, grid, part.fragment, column, row);
             self.seen.push(Seen {
                 pixel: part.pixel,
-                face: map.opaque.face(part.fragment as usize),
+                face: map.face_of(part.fragment as usize),
                 area,
                 moment: area * part.centroid.as_dvec2(),
                 light: light.map(|channel| area * f64::from(channel)),

@@ -169,7 +169,7 @@ impl<'a> Occludee<'a> {
     /// planes is exactly antisymmetric.
     #[inline]
     fn order(&self, occluder: FaceId, other: &[DVec2], sides: &Sides) -> Depth {
-        let by_key = if occluder < self.face {
+        let by_key = if self.faces.wins_tie(occluder, self.face) {
             Depth::InFront
         } else {
             Depth::Behind

@@ -3,7 +3,7 @@ use crate::dice::PixelGrid;
 use rayon::prelude::*;
 use std::ops::Range;
 use veduta_geometry::DVec2;
-use veduta_map::{Fragments, VisibilityMap};
+use veduta_map::VisibilityMap;
 
 /// Rows of pixels in a band. More would leave cores idle and caches full on large pictures; fewer
 /// would visit fragments more often, once for each band that they touch.
@@ -17,7 +17,7 @@ pub struct Bands {
 }
 
 impl Bands {
-    /// Sorts the opaque fragments of `map` into the bands of `grid`.
+    /// Sorts the fragments of `map` into the bands of `grid`.
     pub fn new(map: &VisibilityMap, grid: PixelGrid) -> Self {
         Self::of_fragments(map, grid, |_| true)
     }
@@ -48,12 +48,12 @@ impl Bands {
             "a grid's scale is positive"
         );
         let count = grid.height.div_ceil(BAND_ROWS) as usize;
-        let touched: Vec<Range<u32>> = (0..map.opaque.len())
+        let touched: Vec<Range<u32>> = (0..map.fragment_count())
             .into_par_iter()
             .with_min_len(1024)
             .map(|fragment| {
                 if wanted(fragment) {
-                    bands_touched(map, &map.opaque, fragment, &grid, &bounds)
+                    bands_touched(map, fragment, &grid, &bounds)
                 } else {
                     0..0
                 }
@@ -86,7 +86,7 @@ impl Bands {
         first..(first + BAND_ROWS).min(self.grid.height)
     }
 
-    /// Opaque fragments that touch band `band`, ascending.
+    /// Fragments that touch band `band`, ascending: opaque ones, then those of veils.
     pub fn fragments(&self, band: usize) -> &[u32] {
         self.fragments.of(band)
     }
@@ -96,12 +96,11 @@ impl Bands {
 /// some of the grid's.
 fn bands_touched(
     map: &VisibilityMap,
-    fragments: &Fragments,
     fragment: usize,
     grid: &PixelGrid,
     [columns, rows]: &[Range<u32>; 2],
 ) -> Range<u32> {
-    let polygon = map.polygon(fragments.get(fragment));
+    let polygon = map.polygon(map.fragment(fragment));
     let mut min = polygon[0];
     let mut max = polygon[0];
     for &vertex in &polygon[1..] {

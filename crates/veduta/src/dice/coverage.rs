@@ -29,7 +29,8 @@ fn coverage_of_band(map: &VisibilityMap, bands: &Bands, band: usize) -> Vec<Cove
     let grid = bands.grid();
     let mut dicer = Dicer::default();
     let mut rows = Vec::new();
-    for &fragment in bands.fragments(band) {
+    let opaque = bands.fragments(band).iter();
+    for &fragment in opaque.take_while(|&&fragment| (fragment as usize) < map.opaque.len()) {
         let face = map.opaque.face(fragment as usize);
         let polygon = dicer.placer.place(map, grid, fragment);
         let mut push = |column: u32, row: u32, area| {

@@ -1,3 +1,4 @@
+use super::place::PixelClip;
 use crate::dice::PixelGrid;
 use veduta_geometry::{Affine, DVec2};
 use veduta_map::{Camera, FaceId, Projection, VisibilityMap};
@@ -42,12 +43,11 @@ pub fn depth_of_nearness(camera: &Camera, nearness: f64) -> f64 {
 /// corners of it: of the fragment's polygon clipped by the pixel.
 #[derive(Clone, Debug, Default)]
 pub struct Depths {
-    polygon: Vec<DVec2>,
-    clipped: Vec<DVec2>,
+    clip: PixelClip,
 }
 
 impl Depths {
-    /// Depths of a fragment (an index into [`VisibilityMap::opaque`]) in the pixel at `column`, `row` of
+    /// Depths of a [fragment](VisibilityMap::fragment) in the pixel at `column`, `row` of
     /// `grid`, of which it covers something.
     pub fn of_part(
         &mut self,
@@ -58,22 +58,14 @@ impl Depths {
         row: u32,
     ) -> DepthRange {
         let pixel = DVec2::new(f64::from(column), f64::from(row));
-        let polygon = map.polygon(map.opaque.get(fragment as usize));
-        // From the pixel's corner: clipping at 0 and 1 is exact there.
-        self.polygon.clear();
-        let placed = polygon.iter().map(|&p| grid.pixels_from_image(p) - pixel);
-        self.polygon.extend(placed);
-        for (axis, border, sign) in [(0, 0.0, 1.0), (0, 1.0, -1.0), (1, 0.0, 1.0), (1, 1.0, -1.0)] {
-            clip(&self.polygon, axis, border, sign, &mut self.clipped);
-            std::mem::swap(&mut self.polygon, &mut self.clipped);
-        }
-        let nearness = map.faces.face_nearness(map.opaque.face(fragment as usize));
+        let polygon = self.clip.clip(map, grid, fragment, pixel);
+        let nearness = map.faces.face_nearness(map.face_of(fragment as usize));
         let nearness_at = |p: &DVec2| nearness.at(grid.image_from_pixels(*p + pixel));
-        if self.polygon.is_empty() {
+        if polygon.is_empty() {
             // A sliver that rounding made nothing of: it is somewhere in the pixel.
             return of_square(&map.camera, grid, nearness, pixel);
         }
-        range_of(&map.camera, self.polygon.iter().map(nearness_at))
+        range_of(&map.camera, polygon.iter().map(nearness_at))
     }
 
     /// Depths of a face in a pixel that it fills.
@@ -102,26 +94,5 @@ fn range_of(camera: &Camera, nearness: impl Iterator<Item = f64>) -> DepthRange 
     DepthRange {
         front: depth_of_nearness(camera, most),
         back: depth_of_nearness(camera, least),
-    }
-}
-
-/// What of a polygon lies at `sign * (p[axis] - border) >= 0` (Sutherland and Hodgman).
-fn clip(polygon: &[DVec2], axis: usize, border: f64, sign: f64, kept: &mut Vec<DVec2>) {
-    kept.clear();
-    let Some(&last) = polygon.last() else {
-        return;
-    };
-    let mut p = last;
-    for &q in polygon {
-        let (a, b) = (sign * (p[axis] - border), sign * (q[axis] - border));
-        if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
-            let mut at = p + (q - p) * (a / (a - b));
-            at[axis] = border;
-            kept.push(at);
-        }
-        if b >= 0.0 {
-            kept.push(q);
-        }
-        p = q;
     }
 }

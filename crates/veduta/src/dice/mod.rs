@@ -12,6 +12,9 @@
 //! 2. [`dice`] walks the fragments of a band in order, so that the parts of a pixel always come in
 //!    the order of fragments and sums over them are the same in every run.
 //!
+//! 3. Where veils (faces that are not fully opaque) are seen, [`attenuate`] makes of each part's area what
+//!    is left of it behind the veils before it, once their opacities are known.
+//!
 //! [`dice_spans`] does the same for what multiscan found. [`sum_by_face`] tells which faces a pixel
 //! shows, for all that is not light. [`coverage`] gives the areas in f64, for measuring; [`Depths`] how
 //! deep parts reach, for deep pictures. [`Region`] are the pixels that are made where only some are.
@@ -24,6 +27,7 @@ mod place;
 mod region;
 mod shares;
 mod spans;
+mod veils;
 
 pub use bands::{BAND_ROWS, Bands};
 pub use coverage::{Coverage, coverage};
@@ -32,6 +36,7 @@ pub use pixel_grid::PixelGrid;
 pub use region::Region;
 pub use shares::{Share, largest, sum_by_face};
 pub use spans::{SpanDicer, dice_spans};
+pub use veils::{VeilBuffers, attenuate};
 
 use place::Placer;
 use std::ops::Range;
@@ -43,9 +48,10 @@ use veduta_map::VisibilityMap;
 pub struct Part {
     /// The pixel, counted from the band's first one: row in the band * width + column.
     pub pixel: u32,
-    /// Index of the fragment in [`VisibilityMap::opaque`].
+    /// The [fragment](VisibilityMap::fragment).
     pub fragment: u32,
-    /// Area in square pixels.
+    /// Area in square pixels; from [`attenuate`] on, the integral over it of what is seen of the
+    /// fragment: the transmittance of the veils before it, times its own opacity.
     pub area: f32,
     /// Centroid of the area in pixels from the pixel's top left corner, if it was asked for;
     /// otherwise the pixel's centre.
@@ -59,7 +65,7 @@ pub struct Run {
     pub pixel: u32,
     /// Number of pixels, at least 1.
     pub length: u32,
-    /// Index of the fragment in [`VisibilityMap::opaque`].
+    /// The [fragment](VisibilityMap::fragment), an opaque one.
     pub fragment: u32,
 }
 
@@ -73,9 +79,9 @@ impl Run {
 /// The parts of a band, in order of fragments.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
-    /// Pixels that are covered partly.
+    /// Pixels that are covered partly, and all pixels that veils touch. Those of veils come last.
     pub boundary: Vec<Part>,
-    /// Pixels that are covered wholly.
+    /// Pixels that are covered wholly, and that no veil touches.
     pub runs: Vec<Run>,
 }
 
@@ -84,12 +90,15 @@ pub struct Parts {
 pub struct Dicer {
     placer: Placer,
     grid_areas: GridAreas,
+    veils: Vec<Part>,
+    /// Whether a veil touches a pixel of the band; empty if there is none.
+    veiled: Vec<bool>,
 }
 
-/// Dices the opaque fragments of band `band`; `parts` is overwritten.
+/// Dices the fragments of band `band`; `parts` is overwritten.
 ///
-/// `varies` says of a fragment whether its radiance varies over it. Only then centroids are found,
-/// which take about half as long again as areas.
+/// `varies` says of a fragment whether its radiance varies over it. Only then, and for veils,
+/// centroids are found, which take about half as long again as areas.
 pub fn dice(
     map: &VisibilityMap,
     bands: &Bands,
@@ -103,37 +112,110 @@ pub fn dice(
     let grid = bands.grid();
     let rows = bands.rows(band);
     let index_of = |column: u32, row: u32| (row - rows.start) * grid.width + column;
-    for &fragment in bands.fragments(band) {
+    let fragments = bands.fragments(band);
+    let first_veil = fragments.partition_point(|&k| (k as usize) < map.opaque.len());
+    let (opaque, veils) = fragments.split_at(first_veil);
+    // First, since they say where opaque fragments do not come in runs.
+    dicer.dice_veils(map, bands, band, veils);
+    for &fragment in opaque {
         let polygon = dicer.placer.place(map, grid, fragment);
-        let areas = &mut dicer.grid_areas;
-        let runs = &mut parts.runs;
-        let mut push_run = |row: u32, columns: Range<u32>| {
-            runs.push(Run {
-                pixel: index_of(columns.start, row),
-                length: columns.end - columns.start,
-                fragment,
-            });
+        let (areas, veiled) = (&mut dicer.grid_areas, &dicer.veiled);
+        let Parts { boundary, runs } = parts;
+        let mut push_run = |columns: Range<u32>, row: u32| {
+            if !columns.is_empty() {
+                runs.push(Run {
+                    pixel: index_of(columns.start, row),
+                    length: columns.end - columns.start,
+                    fragment,
+                });
+            }
+        };
+        let mut push_inside = |row: u32, columns: Range<u32>, boundary: &mut Vec<Part>| {
+            if veiled.is_empty() {
+                return push_run(columns, row);
+            }
+            let mut start = columns.start;
+            for column in columns.clone() {
+                let pixel = index_of(column, row);
+                if veiled[pixel as usize] {
+                    push_run(start..column, row);
+                    boundary.push(Part::whole(pixel, fragment));
+                    start = column + 1;
+                }
+            }
+            push_run(start..columns.end, row);
         };
         if varies(fragment) {
             areas.each_cell_with_moments(polygon, grid.width, rows.clone(), |cells| match cells {
-                Cells::Boundary { column, row, area } => parts.boundary.push(Part {
+                Cells::Boundary { column, row, area } => boundary.push(Part {
                     pixel: index_of(column, row),
                     fragment,
                     area: area.area as f32,
                     centroid: area.centroid().as_vec2(),
                 }),
-                Cells::Inside { row, columns } => push_run(row, columns),
+                Cells::Inside { row, columns } => push_inside(row, columns, boundary),
             });
         } else {
             areas.each_cell(polygon, grid.width, rows.clone(), |cells| match cells {
-                Cells::Boundary { column, row, area } => parts.boundary.push(Part {
+                Cells::Boundary { column, row, area } => boundary.push(Part {
+                    area: area as f32,
+                    ..Part::whole(index_of(column, row), fragment)
+                }),
+                Cells::Inside { row, columns } => push_inside(row, columns, boundary),
+            });
+        }
+    }
+    parts.boundary.append(&mut dicer.veils);
+}
+
+impl Part {
+    /// All of a pixel.
+    fn whole(pixel: u32, fragment: u32) -> Self {
+        Self {
+            pixel,
+            fragment,
+            area: 1.0,
+            centroid: Vec2::splat(0.5),
+        }
+    }
+}
+
+impl Dicer {
+    /// Dices the fragments of veils, and marks the pixels that they touch.
+    fn dice_veils(&mut self, map: &VisibilityMap, bands: &Bands, band: usize, veils: &[u32]) {
+        let Self {
+            placer,
+            grid_areas,
+            veils: parts,
+            veiled,
+        } = self;
+        parts.clear();
+        veiled.clear();
+        if veils.is_empty() {
+            return;
+        }
+        let grid = bands.grid();
+        let rows = bands.rows(band);
+        veiled.resize((rows.len() as u32 * grid.width) as usize, false);
+        let index_of = |column: u32, row: u32| (row - rows.start) * grid.width + column;
+        for &fragment in veils {
+            let polygon = placer.place(map, grid, fragment);
+            let rows = rows.clone();
+            grid_areas.each_cell_with_moments(polygon, grid.width, rows, |cells| match cells {
+                Cells::Boundary { column, row, area } => parts.push(Part {
                     pixel: index_of(column, row),
                     fragment,
-                    area: area as f32,
-                    centroid: Vec2::splat(0.5),
+                    area: area.area as f32,
+                    centroid: area.centroid().as_vec2(),
                 }),
-                Cells::Inside { row, columns } => push_run(row, columns),
+                Cells::Inside { row, columns } => {
+                    parts
+                        .extend(columns.map(|column| Part::whole(index_of(column, row), fragment)));
+                }
             });
+        }
+        for part in parts {
+            veiled[part.pixel as usize] = true;
         }
     }
 }

@@ -13,7 +13,7 @@ impl Placer {
     /// The polygon of a fragment in pixels, clipped to the columns of the grid.
     #[inline(always)]
     pub fn place(&mut self, map: &VisibilityMap, grid: &PixelGrid, fragment: u32) -> &[DVec2] {
-        let polygon = map.polygon(map.opaque.get(fragment as usize));
+        let polygon = map.polygon(map.fragment(fragment as usize));
         let width = f64::from(grid.width);
         let mut outside = false;
         self.polygon.clear();
@@ -27,6 +27,57 @@ impl Placer {
             clip_column(&self.clipped, width, -1.0, &mut self.polygon);
         }
         &self.polygon
+    }
+}
+
+/// Clips fragments to single pixels, in a buffer that it keeps.
+#[derive(Clone, Debug, Default)]
+pub struct PixelClip {
+    polygon: Vec<DVec2>,
+    clipped: Vec<DVec2>,
+}
+
+impl PixelClip {
+    /// What of a fragment lies in the pixel whose top left corner is at `pixel` of `grid`, measured from
+    /// that corner. Rounding may make nothing of a sliver.
+    pub fn clip(
+        &mut self,
+        map: &VisibilityMap,
+        grid: &PixelGrid,
+        fragment: u32,
+        pixel: DVec2,
+    ) -> &[DVec2] {
+        let polygon = map.polygon(map.fragment(fragment as usize));
+        // From the pixel's corner: clipping at 0 and 1 is exact there.
+        self.polygon.clear();
+        let placed = polygon.iter().map(|&p| grid.pixels_from_image(p) - pixel);
+        self.polygon.extend(placed);
+        for (axis, border, sign) in [(0, 0.0, 1.0), (0, 1.0, -1.0), (1, 0.0, 1.0), (1, 1.0, -1.0)] {
+            clip_axis(&self.polygon, axis, border, sign, &mut self.clipped);
+            std::mem::swap(&mut self.polygon, &mut self.clipped);
+        }
+        &self.polygon
+    }
+}
+
+/// What of a polygon lies at `sign * (p[axis] - border) >= 0` (Sutherland and Hodgman).
+fn clip_axis(polygon: &[DVec2], axis: usize, border: f64, sign: f64, kept: &mut Vec<DVec2>) {
+    kept.clear();
+    let Some(&last) = polygon.last() else {
+        return;
+    };
+    let mut p = last;
+    for &q in polygon {
+        let (a, b) = (sign * (p[axis] - border), sign * (q[axis] - border));
+        if (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0) {
+            let mut at = p + (q - p) * (a / (a - b));
+            at[axis] = border;
+            kept.push(at);
+        }
+        if b >= 0.0 {
+            kept.push(q);
+        }
+        p = q;
     }
 }
 

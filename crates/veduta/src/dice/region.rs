@@ -41,7 +41,7 @@ impl Region {
         wanted: impl Fn(FaceId) -> bool + Sync,
     ) -> Self {
         let mut region = Self::none(grid);
-        let bands = Bands::of_fragments(map, *grid, |fragment| wanted(map.opaque.face(fragment)));
+        let bands = Bands::of_fragments(map, *grid, |fragment| wanted(map.face_of(fragment)));
         let (mut dicer, mut parts) = (Dicer::default(), Parts::default());
         for band in 0..bands.len() {
             dice(map, &bands, band, |_| false, &mut dicer, &mut parts);

@@ -1,24 +1,18 @@
 //! The same stages, up to deep pixels instead of flat ones.
 
-use super::{
-    FACES_PER_STRIP, RenderSettings, Sampling, Shortcoming, Step, map_of, material_of,
-    materials_seen, shortcomings_of,
-};
+use super::{FACES_PER_STRIP, RenderSettings, Sampling, Step, map_of, material_of, materials_seen};
 use crate::accumulate::{DeepFilter, DeepRows};
-use crate::dice::{self, Bands, Dicer, Parts, PixelGrid};
+use crate::dice::{self, Bands, Dicer, Parts, PixelGrid, VeilBuffers};
 use crate::scene::Scene;
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
 use crate::visibility::{self, Strips};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
-use veduta_map::{Camera, FaceId, VisibilityMap};
+use veduta_map::{Camera, VisibilityMap};
 
 /// Makes the deep picture that `camera` takes of `scene`: flat, it is the picture of
 /// [`render`](super::render). `write` gets its rows from the top, some at a time; only those at work are in
 /// memory. `begin` is told of each step.
-///
-/// Tells what the picture does not show as it should, in ascending order.
 ///
 /// # Errors
 /// Whatever `write` fails with.
@@ -31,7 +25,7 @@ pub fn render_deep<E>(
     settings: &RenderSettings,
     mut begin: impl FnMut(Step),
     mut write: impl FnMut(&DeepRows) -> Result<(), E>,
-) -> Result<Vec<Shortcoming>, E> {
+) -> Result<(), E> {
     assert!(
         settings.sampling == Sampling::Exact,
         "deep pixels are found exactly"
@@ -45,8 +39,7 @@ pub fn render_deep<E>(
         begin(Step::Shading);
         let materials = materials_seen(scene, &map);
         let textures = Textures::new(scene, &materials);
-        write_rows(scene, &textures, &map, &frame, settings.unlit, &mut write)?;
-        return Ok(shortcomings_of(scene, materials, map.veils.len()));
+        return write_rows(scene, &textures, &map, &frame, settings.unlit, &mut write);
     }
 
     // As for flat pictures, strip by strip.
@@ -57,8 +50,6 @@ pub fn render_deep<E>(
     let strips = Strips::new(&faces, rows.iter().map(border).collect());
     let in_view = faces.ids().map(|face| material_of(scene, &faces, face));
     let textures = Textures::new(scene, &in_view.collect());
-    let mut seen = BTreeSet::new();
-    let mut veils = 0;
     for strip in 0..count {
         begin(Step::Strip {
             index: strip,
@@ -68,10 +59,8 @@ pub fn render_deep<E>(
         let [first, end] = [rows[strip], rows[strip + 1]];
         let grid = frame.window(0.0, first as f64, frame.width, (end - first) as u32);
         write_rows(scene, &textures, &map, &grid, settings.unlit, &mut write)?;
-        seen.extend(materials_seen(scene, &map));
-        veils += map.veils.len();
     }
-    Ok(shortcomings_of(scene, seen, veils))
+    Ok(())
 }
 
 /// What a thread keeps from band to band.
@@ -79,6 +68,7 @@ pub fn render_deep<E>(
 struct Buffers {
     dicer: Dicer,
     parts: Parts,
+    veils: VeilBuffers,
     radiance: Radiance,
     filter: DeepFilter,
 }
@@ -92,7 +82,7 @@ fn write_rows<E>(
     unlit: bool,
     write: &mut impl FnMut(&DeepRows) -> Result<(), E>,
 ) -> Result<(), E> {
-    let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+    let shown = map.shown_faces();
     let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
     let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
     let bands = Bands::new(map, *grid);
@@ -107,6 +97,8 @@ fn write_rows<E>(
                 let rows = bands.rows(band);
                 let radiance = &mut buffers.radiance;
                 surfaces.shade(parts, grid, rows.start, radiance);
+                let (opacities, veils) = (&radiance.opacities, &mut buffers.veils);
+                dice::attenuate(map, grid, rows.start, opacities, veils, parts);
                 let mut deep = DeepRows::default();
                 let band = [rows.start, rows.end - rows.start];
                 let filter = &mut buffers.filter;

@@ -268,11 +268,10 @@ fn seen_share(seen: &SeenScene, units: &[Unit], changed: &[bool]) -> f64 {
     let has_changed: Vec<bool> = objects
         .map(|object| names.contains(unit_name(&seen.scene, object)))
         .collect();
-    let fragments = &seen.map.opaque;
-    let of_changed = fragments
-        .iter()
-        .filter(|fragment| has_changed[seen.map.faces.object(fragment.face()).index()]);
-    of_changed.count() as f64 / fragments.len().max(1) as f64
+    let map = &seen.map;
+    let of_changed = (0..map.fragment_count())
+        .filter(|&fragment| has_changed[map.faces.object(map.face_of(fragment)).index()]);
+    of_changed.count() as f64 / map.fragment_count().max(1) as f64
 }
 
 /// The name of an object's layer, or its own if it is of none.

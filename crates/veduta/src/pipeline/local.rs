@@ -40,17 +40,18 @@ pub fn render_region(
     let bands = Bands::within(map, *grid, bounds);
     let touched = (0..bands.len()).flat_map(|band| bands.fragments(band));
     let faces: BTreeSet<FaceId> = touched
-        .map(|&fragment| map.opaque.face(fragment as usize))
+        .map(|&fragment| map.face_of(fragment as usize))
         .collect();
     let materials: BTreeSet<MaterialId> = faces
         .iter()
         .map(|&face| material_of(scene, &map.faces, face))
         .collect();
     let textures = Textures::new(scene, &materials);
-    let shown: Vec<FaceId> = (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+    let shown = map.shown_faces();
     let (camera, light) = (&map.camera, Daylight::default());
     let surfaces = Surfaces::new(scene, &textures, camera, &map.faces, &shown, light, unlit);
 
+    let veiled = (!map.veils.is_empty()).then_some(map);
     let band_pixels = grid.width as usize * BAND_ROWS as usize;
     let pixels = picture.pixels.par_chunks_mut(band_pixels);
     let is_made = region.pixels().par_chunks(band_pixels);
@@ -65,7 +66,7 @@ pub fn render_region(
             let first_row = bands.rows(band).start;
             region.clip(parts, first_row);
             made.resize(pixels.len(), [0.0; 4]);
-            buffers.finish(&surfaces, grid, first_row, made);
+            buffers.finish(&surfaces, veiled, grid, first_row, made);
             let rows = pixels.iter_mut().zip(&*made).zip(is_made);
             for ((pixel, made), _) in rows.filter(|row| *row.1) {
                 *pixel = *made;

@@ -9,9 +9,11 @@
 mod coplanar;
 mod framing;
 pub mod generate;
+mod opacity;
 
 pub use coplanar::{FaceIndex, PlaneGroups};
 pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
+pub use opacity::{Opacities, Opacity};
 pub use veduta_map::scene::{
     AlphaMode, Image, ImageId, Layer, Light, LightKind, Material, Mesh, MeshError, MeshId, Object,
     ObjectKey, Scene, TexcoordSet, TextureRef, World, Wrap,

@@ -12,8 +12,11 @@
 //!
 //! [`Points`] tells of a face what is not light: where its points are, and how they are turned.
 //!
+//! Of veils, faces that are not fully opaque, the opacity is evaluated beside the radiance. A part of a
+//! pixel has one opacity, that at its centroid.
+//!
 //! The light is a stand-in, a sun and a plain sky ([`light`]); those of the scene
-//! ([`Scene::lights`]) are not looked at. Nor is opacity: all that is diced is opaque.
+//! ([`Scene::lights`]) are not looked at.
 
 pub mod light;
 mod points;
@@ -23,20 +26,22 @@ mod texture;
 pub use points::Points;
 
 use crate::dice::{Parts, PixelGrid};
-use crate::scene::{ImageId, Material, Scene, TextureRef};
+use crate::scene::{AlphaMode, Material, Scene, TextureRef};
 use light::Daylight;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use surface::{PicturePoint, Surface, SurfacePoint, Varying, Viewer};
-use texture::Pyramid;
-use veduta_geometry::{DVec2, Vec3};
+use surface::{PicturePoint, Surface, SurfacePoint, Varying, Viewer, opacity_of};
+use texture::{Pyramid, TexelOpacity};
+use veduta_geometry::{DVec2, Vec3, Vec4};
 use veduta_map::{Camera, FaceId, Faces, MaterialId};
 
-/// Radiance of the parts of a band: linear RGB.
+/// Radiance of the parts of a band: linear RGB, not multiplied by opacity.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Radiance {
     /// Of each of [`Parts::boundary`].
     pub boundary: Vec<[f32; 3]>,
+    /// Opacity of those parts that are of veils, which are the last ones.
+    pub opacities: Vec<f32>,
     /// Of [`Parts::runs`], one after the other.
     runs: Vec<[f32; 3]>,
     /// Where in `runs` each run's end.
@@ -54,6 +59,7 @@ impl Radiance {
 
     fn clear(&mut self) {
         self.boundary.clear();
+        self.opacities.clear();
         self.runs.clear();
         self.run_end.clear();
     }
@@ -61,28 +67,49 @@ impl Radiance {
 
 /// Pictures of a scene made ready for shading: pyramids of those in use.
 pub struct Textures<'a> {
-    /// By image.
-    pyramids: Vec<Option<Pyramid<'a>>>,
+    pyramids: Vec<Pyramid<'a>>,
+    /// The pictures of each material: rows of `pyramids`.
+    of_material: Vec<Pictures>,
+}
+
+/// The pictures of a material.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pictures {
+    color: Option<usize>,
+    emission: Option<usize>,
 }
 
 impl<'a> Textures<'a> {
     /// Prepares the pictures of `materials`.
     pub fn new(scene: &'a Scene, materials: &BTreeSet<MaterialId>) -> Self {
-        let images: BTreeSet<ImageId> = materials
-            .iter()
-            .flat_map(|&material| {
-                let material = scene.material(material);
-                [material.base_color_texture, material.emissive_texture]
-            })
-            .flatten()
-            .map(|texture| texture.image)
-            .collect();
-        let pyramids = scene.images.par_iter().enumerate().map(|(index, image)| {
-            let is_used = images.contains(&ImageId(index as u32));
-            is_used.then(|| Pyramid::new(image))
-        });
+        // A picture has a pyramid for each use of its opacity.
+        let mut wanted: Vec<(usize, TexelOpacity)> = Vec::new();
+        let mut row_of = |texture: Option<TextureRef>, opacity: TexelOpacity| {
+            let picture = (texture?.image.0 as usize, opacity);
+            let row = wanted.iter().position(|&other| other == picture);
+            Some(row.unwrap_or_else(|| {
+                wanted.push(picture);
+                wanted.len() - 1
+            }))
+        };
+        let mut of_material = vec![Pictures::default(); scene.materials.len()];
+        for &id in materials {
+            let material = scene.material(id);
+            let opacity = match material.alpha_mode {
+                AlphaMode::Opaque => TexelOpacity::Ignored,
+                AlphaMode::Blend => TexelOpacity::Blended,
+                AlphaMode::Mask(cutoff) => TexelOpacity::Cut(cutoff / material.base_color[3]),
+            };
+            of_material[id.index()] = Pictures {
+                color: row_of(material.base_color_texture, opacity),
+                emission: row_of(material.emissive_texture, TexelOpacity::Ignored),
+            };
+        }
+        let pyramids = wanted.into_par_iter();
+        let pyramids = pyramids.map(|(image, opacity)| Pyramid::new(&scene.images[image], opacity));
         Self {
             pyramids: pyramids.collect(),
+            of_material,
         }
     }
 }
@@ -96,11 +123,13 @@ pub struct Surfaces<'a> {
     /// Of each fragment.
     surfaces: Vec<Surface>,
     varying: Vec<Varying>,
+    /// Opacities of the fragments of veils, which are the last ones; of those that vary it is unused.
+    opacities: Vec<f32>,
 }
 
 impl<'a> Surfaces<'a> {
     /// Looks at what `camera` sees of `scene`: `shown` are the faces of the fragments that
-    /// [`Parts`] refer to, ascending. `textures` hold the pictures of all their materials. With
+    /// [`Parts`] refer to, opaque ones first, each kind ascending. `textures` hold the pictures of all their materials. With
     /// `unlit`, materials show their colour as it is.
     pub fn new(
         scene: &'a Scene,
@@ -134,6 +163,9 @@ impl<'a> Surfaces<'a> {
         }
         let varying = varying.par_iter().map(|&face| viewer.varying(face));
         let varying = varying.collect();
+        let first_veil = shown.partition_point(|&face| !faces.is_veil(face));
+        let veils = shown[first_veil..].iter();
+        let opacities = veils.map(|&face| viewer.constant_opacity(face).unwrap_or(1.0));
         Self {
             scene,
             textures,
@@ -141,7 +173,15 @@ impl<'a> Surfaces<'a> {
             unlit,
             surfaces,
             varying,
+            opacities: opacities.collect(),
         }
+    }
+
+    /// The opacity of a fragment, if it is the same at all points of it and so is the radiance.
+    fn constant_opacity(&self, fragment: u32) -> Option<f32> {
+        let first_veil = self.surfaces.len() - self.opacities.len();
+        let veil = (fragment as usize).checked_sub(first_veil)?;
+        Some(self.opacities[veil])
     }
 
     /// Whether radiance differs from point to point of a fragment.
@@ -166,15 +206,19 @@ impl<'a> Surfaces<'a> {
             let row = first_row + pixel / grid.width;
             DVec2::new(f64::from(pixel % grid.width), f64::from(row))
         };
-        radiance.boundary.extend(parts.boundary.iter().map(|part| {
-            match self.surfaces[part.fragment as usize] {
-                Surface::Constant(radiance) => radiance,
+        for part in &parts.boundary {
+            let (light, opacity) = match self.surfaces[part.fragment as usize] {
+                Surface::Constant(light) => (light, self.constant_opacity(part.fragment)),
                 Surface::Varying(row) => {
                     let place = corner(part.pixel) + part.centroid.as_dvec2();
-                    self.radiance(&self.varying[row as usize], grid, place)
+                    let (light, opacity) = self.look(&self.varying[row as usize], grid, place);
+                    let is_veil = self.constant_opacity(part.fragment).is_some();
+                    (light, is_veil.then_some(opacity))
                 }
-            }
-        }));
+            };
+            radiance.boundary.push(light);
+            radiance.opacities.extend(opacity);
+        }
         for run in &parts.runs {
             match self.surfaces[run.fragment as usize] {
                 Surface::Constant(value) => radiance.runs.push(value),
@@ -182,7 +226,8 @@ impl<'a> Surfaces<'a> {
                     let face = &self.varying[row as usize];
                     let first = corner(run.pixel) + 0.5;
                     radiance.runs.extend((0..run.length).map(|step| {
-                        self.radiance(face, grid, first + DVec2::new(f64::from(step), 0.0))
+                        self.look(face, grid, first + DVec2::new(f64::from(step), 0.0))
+                            .0
                     }));
                 }
             }
@@ -190,50 +235,76 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Radiance of a face at a place of the grid.
-    fn radiance(&self, face: &Varying, grid: &PixelGrid, place: DVec2) -> [f32; 3] {
+    /// Radiance and opacity of a face at a place of the grid.
+    fn look(&self, face: &Varying, grid: &PixelGrid, place: DVec2) -> ([f32; 3], f32) {
         let material = self.scene.material(face.material);
+        let pictures = &self.textures.of_material[face.material.index()];
         let point = face.at(grid.image_from_pixels(place));
-        let color = self.color(material, &point, grid);
+        let (color, opacity) = self.color(material, pictures, &point, grid);
         let radiance = if self.unlit || material.unlit {
             color
         } else {
-            color * self.light.on(point.normal) + self.emission(material, &point, grid)
+            color * self.light.on(point.normal) + self.emission(material, pictures, &point, grid)
         };
-        radiance.into()
+        (radiance.into(), opacity)
     }
 
-    /// The material's colour at a point: its own, times the texture's, times the vertices'.
-    fn color(&self, material: &Material, point: &SurfacePoint, grid: &PixelGrid) -> Vec3 {
+    /// The material's colour and opacity at a point: its own, times the texture's, times the vertices'.
+    fn color(
+        &self,
+        material: &Material,
+        pictures: &Pictures,
+        point: &SurfacePoint,
+        grid: &PixelGrid,
+    ) -> (Vec3, f32) {
         let [r, g, b, _] = material.base_color;
         let color = Vec3::new(r, g, b) * point.color;
-        match (material.base_color_texture, &point.picture) {
-            (Some(texture), Some(place)) => color * self.texel(&texture, place, grid),
-            _ => color,
+        let opacity = opacity_of(material, point.opacity);
+        match (material.base_color_texture, pictures.color, &point.picture) {
+            (Some(texture), Some(picture), Some(place)) => {
+                let texel = self.texel(&texture, picture, place, grid);
+                match material.alpha_mode {
+                    AlphaMode::Opaque => (color * texel.truncate(), opacity),
+                    _ if texel.w > 0.0 => (color * texel.truncate() / texel.w, opacity * texel.w),
+                    _ => (Vec3::ZERO, 0.0),
+                }
+            }
+            _ => (color, opacity),
         }
     }
 
     /// What the material gives off at a point: its own radiance, times the texture's.
-    fn emission(&self, material: &Material, point: &SurfacePoint, grid: &PixelGrid) -> Vec3 {
+    fn emission(
+        &self,
+        material: &Material,
+        pictures: &Pictures,
+        point: &SurfacePoint,
+        grid: &PixelGrid,
+    ) -> Vec3 {
         let emission = Vec3::from(material.emissive);
-        match (material.emissive_texture, &point.emissive_picture) {
-            (Some(texture), Some(place)) => emission * self.texel(&texture, place, grid),
+        let place = &point.emissive_picture;
+        match (material.emissive_texture, pictures.emission, place) {
+            (Some(texture), Some(picture), Some(place)) => {
+                emission * self.texel(&texture, picture, place, grid).truncate()
+            }
             _ => emission,
         }
     }
 
-    /// Mean colour of a texture in the footprint of a pixel.
-    fn texel(&self, texture: &TextureRef, place: &PicturePoint, grid: &PixelGrid) -> Vec3 {
-        let pyramid = self.textures.pyramids[texture.image.0 as usize]
-            .as_ref()
-            .expect("pyramids of all pictures in use are made");
+    /// Mean of a picture in the footprint of a pixel.
+    fn texel(
+        &self,
+        texture: &TextureRef,
+        picture: usize,
+        place: &PicturePoint,
+        grid: &PixelGrid,
+    ) -> Vec4 {
         let pixel = grid.pixels_per_frame;
-        let texel = pyramid.sample(
+        self.textures.pyramids[picture].sample(
             place.at,
             place.along_x / pixel.x,
             place.along_y / pixel.y,
             texture.wrap,
-        );
-        texel.truncate()
+        )
     }
 }

@@ -1,6 +1,6 @@
 //! What a face looks like from the eye, made ready for evaluation at any point of it.
 
-use crate::scene::{Scene, TextureRef};
+use crate::scene::{AlphaMode, Material, Scene, TextureRef};
 use crate::shade::light::Daylight;
 use crate::shade::texture::picture_from_uv;
 use veduta_geometry::{DMat3, DMat4, DVec2, DVec3, Vec3};
@@ -29,6 +29,7 @@ pub struct Varying {
     /// Those in the picture of the emission; boxed because few faces have one.
     emissive_picture: Option<Box<[DVec2; 3]>>,
     colors: Option<[Vec3; 3]>,
+    opacities: Option<[f32; 3]>,
 }
 
 /// A point of a face as shading sees it.
@@ -38,6 +39,8 @@ pub struct SurfacePoint {
     pub normal: Vec3,
     /// Factor of the material's colour.
     pub color: Vec3,
+    /// Factor of the material's opacity.
+    pub opacity: f32,
     /// Place in the texture of the colour, if there is one.
     pub picture: Option<PicturePoint>,
     /// Place in the texture of the emission, if there is one.
@@ -157,6 +160,9 @@ impl<'a> Viewer<'a> {
         if textures.iter().flatten().any(placed) {
             return None;
         }
+        if self.faces.is_veil(face) {
+            self.constant_opacity(face)?;
+        }
         let [r, g, b, _] = material.base_color;
         let mut color = Vec3::new(r, g, b);
         if !mesh.colors.is_empty() {
@@ -169,6 +175,20 @@ impl<'a> Viewer<'a> {
         let normal = self.constant_normal(face)?;
         let radiance = color * light.on(normal) + Vec3::from(material.emissive);
         Some(radiance.into())
+    }
+
+    /// The opacity of a face without textures, if it is the same everywhere.
+    pub fn constant_opacity(&self, face: FaceId) -> Option<f32> {
+        let (object, source) = (self.faces.object(face), self.faces.source(face));
+        let mesh = self.scene.mesh_of(object);
+        let material = self.scene.material_of(object, source);
+        let of_corners = if mesh.opacities.is_empty() {
+            1.0
+        } else {
+            let corners = self.corners(object, source);
+            all_equal(corners.map(|corner| mesh.opacities[corner]))?
+        };
+        Some(opacity_of(material, of_corners))
     }
 
     /// The face's unit normal in world space, on the eye's side, if it is the same everywhere.
@@ -218,6 +238,8 @@ impl<'a> Viewer<'a> {
             emissive_picture: picture(textures.emissive_texture).map(Box::new),
             colors: has(mesh.colors.len())
                 .map(|corners| corners.map(|corner| Vec3::from(mesh.colors[corner]))),
+            opacities: has(mesh.opacities.len())
+                .map(|corners| corners.map(|corner| mesh.opacities[corner])),
         }
     }
 
@@ -245,6 +267,16 @@ impl<'a> Viewer<'a> {
         };
         let normal = self.world_from_eye * normal;
         (if away { -normal } else { normal }).as_vec3()
+    }
+}
+
+/// The opacity of a material without texture where that of the corners is `of_corners`.
+pub fn opacity_of(material: &Material, of_corners: f32) -> f32 {
+    let opacity = material.base_color[3] * of_corners;
+    match material.alpha_mode {
+        AlphaMode::Opaque => 1.0,
+        AlphaMode::Mask(cutoff) => f32::from(opacity >= cutoff),
+        AlphaMode::Blend => opacity.clamp(0.0, 1.0),
     }
 }
 
@@ -288,6 +320,9 @@ impl Varying {
         SurfacePoint {
             normal: self.normal_of([w0, w1, w2]),
             color: self.colors.map_or(Vec3::ONE, mean),
+            opacity: self.opacities.map_or(1.0, |[a, b, c]| {
+                a * w0 as f32 + b * w1 as f32 + c * w2 as f32
+            }),
             picture: self.picture.as_ref().map(place),
             emissive_picture: self.emissive_picture.as_deref().map(place),
         }
@@ -370,6 +405,7 @@ mod tests {
                     picture: Some([(0.0, 0.3), (1.0, 0.1), (0.4, 2.0)].map(DVec2::from)),
                     emissive_picture: None,
                     colors: None,
+                    opacities: None,
                 };
                 let at = |p| face.at(p).picture.expect("it has a texture");
                 let [v0, v1, v2] = triangle;

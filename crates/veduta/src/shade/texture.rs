@@ -13,12 +13,25 @@ use veduta_geometry::{DVec2, Vec2, Vec4};
 /// A texture at all scales: level `k` has about 1/2^k of the picture's columns and rows.
 ///
 /// Level 0 is the picture itself, decoded at each look-up, since most pictures are larger than what
-/// is seen of them. Opacity is averaged apart from colour, for materials may ignore it.
+/// is seen of them.
 #[derive(Debug)]
 pub struct Pyramid<'a> {
     image: &'a Image,
+    opacity: TexelOpacity,
     /// Levels from 1 on.
     levels: Vec<Level>,
+}
+
+/// What a material makes of the opacity of texels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TexelOpacity {
+    /// Nothing: all texels have their colour, and means are taken apart from opacity.
+    Ignored,
+    /// Texels let through what is behind. Means are of premultiplied colours, so that the colour of
+    /// texels that cannot be seen, which is anything, does not bleed into the others.
+    Blended,
+    /// Texels of at least this opacity are there, the others are not. Means tell how much is there.
+    Cut(f32),
 }
 
 #[derive(Debug)]
@@ -55,26 +68,46 @@ fn decode([r, g, b, a]: [u8; 4]) -> Vec4 {
     )
 }
 
+impl TexelOpacity {
+    /// What a texel counts for in means: colour (premultiplied unless opacity is ignored) and opacity.
+    #[inline(always)]
+    fn apply(self, texel: Vec4) -> Vec4 {
+        match self {
+            TexelOpacity::Ignored => texel,
+            TexelOpacity::Blended => (texel.truncate() * texel.w).extend(texel.w),
+            TexelOpacity::Cut(cutoff) if texel.w >= cutoff => texel.truncate().extend(1.0),
+            TexelOpacity::Cut(_) => Vec4::ZERO,
+        }
+    }
+}
+
 impl<'a> Pyramid<'a> {
     /// Takes the means of a picture.
-    pub fn new(image: &'a Image) -> Self {
+    pub fn new(image: &'a Image, opacity: TexelOpacity) -> Self {
         let mut levels: Vec<Level> = Vec::new();
         loop {
             let (width, height) = levels
                 .last()
                 .map_or((image.width, image.height), |l| (l.width, l.height));
             if width == 1 && height == 1 {
-                return Self { image, levels };
+                return Self {
+                    image,
+                    opacity,
+                    levels,
+                };
             }
             let next = match levels.last() {
                 Some(level) => halved(width, height, |index| level.texels[index]),
-                None => halved(width, height, |index| decode(image.pixels[index])),
+                None => halved(width, height, |index| {
+                    opacity.apply(decode(image.pixels[index]))
+                }),
             };
             levels.push(next);
         }
     }
 
-    /// Mean colour (linear) and opacity in a footprint around `at`.
+    /// Mean colour (linear) and opacity in a footprint around `at`; the colour is premultiplied unless
+    /// opacity is [ignored](TexelOpacity::Ignored).
     ///
     /// Coordinates are the picture's, (0, 0) its top left corner and (1, 1) its bottom right one.
     /// The footprint is a parallelogram with sides `along_x` and `along_y`: how `at` changes from a
@@ -89,7 +122,10 @@ impl<'a> Pyramid<'a> {
         let long = (mean + root).sqrt();
         let short = (mean - root).max(0.0).sqrt();
         if long.is_nan() || long <= 1.0 {
-            return self.trilinear(at, 0.0, wrap);
+            return match self.opacity {
+                TexelOpacity::Cut(cutoff) => self.cut(at, along_x, along_y, wrap, cutoff),
+                _ => self.bilinear(at, 0, wrap),
+            };
         }
         let probes = (long / short.max(1.0)).ceil().min(MAX_ANISOTROPY);
         let level = (long / probes).max(short).max(1.0).log2();
@@ -109,6 +145,27 @@ impl<'a> Pyramid<'a> {
         sum / count as f32
     }
 
+    /// Colour and opacity of a cut-out seen so large that texels are larger than pixels: its edge lies
+    /// where the interpolated opacity is the cutoff, and is antialiased over the footprint as if opacity
+    /// were affine there. (Texels either there or not would show as squares.)
+    fn cut(&self, at: DVec2, along_x: DVec2, along_y: DVec2, wrap: [Wrap; 2], cutoff: f32) -> Vec4 {
+        let texel = |at| self.bilinear_of(at, 0, wrap, TexelOpacity::Blended);
+        let change = |along: DVec2| (texel(at + 0.5 * along).w - texel(at - 0.5 * along).w).abs();
+        let here = texel(at);
+        let width = change(along_x) + change(along_y);
+        let above = here.w - cutoff;
+        let there = if width > 0.0 {
+            (above / width + 0.5).clamp(0.0, 1.0)
+        } else {
+            f32::from(above >= 0.0)
+        };
+        if here.w > 0.0 {
+            (here.truncate() / here.w * there).extend(there)
+        } else {
+            Vec4::ZERO
+        }
+    }
+
     fn trilinear(&self, at: DVec2, level: f64, wrap: [Wrap; 2]) -> Vec4 {
         let below = floor(level).min(self.levels.len() as f64);
         let near = self.bilinear(at, below as usize, wrap);
@@ -121,6 +178,12 @@ impl<'a> Pyramid<'a> {
     }
 
     fn bilinear(&self, at: DVec2, level: usize, wrap: [Wrap; 2]) -> Vec4 {
+        self.bilinear_of(at, level, wrap, self.opacity)
+    }
+
+    /// `opacity` is what to make of the opacity of texels of level 0.
+    #[inline(always)]
+    fn bilinear_of(&self, at: DVec2, level: usize, wrap: [Wrap; 2], opacity: TexelOpacity) -> Vec4 {
         let (width, height) = match level.checked_sub(1) {
             None => (self.image.width, self.image.height),
             Some(above) => (self.levels[above].width, self.levels[above].height),
@@ -130,7 +193,7 @@ impl<'a> Pyramid<'a> {
         let texel = |column: u32, row: u32| {
             let index = row as usize * width as usize + column as usize;
             match level.checked_sub(1) {
-                None => decode(self.image.pixels[index]),
+                None => opacity.apply(decode(self.image.pixels[index])),
                 Some(above) => self.levels[above].texels[index],
             }
         };
@@ -273,7 +336,7 @@ mod tests {
     fn every_level_has_the_mean_of_the_picture() {
         for (width, height) in [(8, 8), (7, 5), (1, 9), (13, 2)] {
             let image = image(width, height, |i, j| [(37 * i + 11 * j) as u8, 90, 3, 255]);
-            let pyramid = Pyramid::new(&image);
+            let pyramid = Pyramid::new(&image, TexelOpacity::Ignored);
             let mean = |sum: Vec4, count: usize| sum / count as f32;
             let whole: Vec4 = image.pixels.iter().map(|&pixel| decode(pixel)).sum();
             let expected = mean(whole, image.pixels.len());
@@ -292,7 +355,7 @@ mod tests {
     #[test]
     fn a_small_checkerboard_is_grey_in_linear_light() {
         let image = checker(64, 64);
-        let pyramid = Pyramid::new(&image);
+        let pyramid = Pyramid::new(&image, TexelOpacity::Ignored);
         for footprint in [4.0, 20.0, 200.0] {
             let step = footprint / 64.0;
             let (x, y) = (DVec2::new(step, 0.0), DVec2::new(0.0, step));
@@ -311,7 +374,7 @@ mod tests {
                 [0, 0, 0, 255]
             }
         });
-        let pyramid = Pyramid::new(&image);
+        let pyramid = Pyramid::new(&image, TexelOpacity::Ignored);
         let (short, long) = (1.0 / 64.0, 16.0 / 64.0);
         let centre_of_white = DVec2::new(10.0 / 64.0, 0.5);
         for turned in [false, true] {
@@ -333,7 +396,7 @@ mod tests {
                 [240, 0, 0, 255],
             ][i as usize]
         });
-        let pyramid = Pyramid::new(&image);
+        let pyramid = Pyramid::new(&image, TexelOpacity::Ignored);
         let red = |u: f64, wrap| {
             pyramid
                 .sample(DVec2::new(u, 0.5), DVec2::ZERO, DVec2::ZERO, [wrap; 2])
@@ -371,11 +434,58 @@ mod tests {
     #[test]
     fn a_texel_seen_large_has_its_own_colour() {
         let image = checker(4, 4);
-        let pyramid = Pyramid::new(&image);
+        let pyramid = Pyramid::new(&image, TexelOpacity::Ignored);
         let step = DVec2::splat(1e-4);
         for (i, expected) in [(0, 1.0), (1, 0.0), (2, 1.0)] {
             let at = DVec2::new((f64::from(i) + 0.5) / 4.0, 0.125);
             assert_eq!(pyramid.sample(at, step, step, ALL).x, expected);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_seen_of_a_picture_has_no_colour() {
+        // Left half red, right half a green that is not there.
+        let image = image(8, 8, |i, _| {
+            if i < 4 {
+                [255, 0, 0, 255]
+            } else {
+                [0, 255, 0, 0]
+            }
+        });
+        for opacity in [TexelOpacity::Blended, TexelOpacity::Cut(0.5)] {
+            let pyramid = Pyramid::new(&image, opacity);
+            for footprint in [0.01, 0.3, 1.0] {
+                let (x, y) = (DVec2::new(footprint, 0.0), DVec2::new(0.0, footprint));
+                let found = pyramid.sample(DVec2::splat(0.5), x, y, ALL);
+                let expected = Vec4::new(0.5, 0.0, 0.0, 0.5);
+                assert!((found - expected).abs().max_element() < 1e-6, "{found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_cut_out_seen_large_has_a_sharp_edge_where_opacity_is_the_cutoff() {
+        let image = image(2, 1, |i, _| [200, 0, 0, [0, 255][i as usize]]);
+        let pyramid = Pyramid::new(&image, TexelOpacity::Cut(0.25));
+        let step = 1e-3;
+        let opacity = |u: f64| {
+            let at = DVec2::new(u, 0.5);
+            let (x, y) = (DVec2::new(step, 0.0), DVec2::new(0.0, step));
+            pyramid.sample(at, x, y, [Wrap::Clamp; 2]).w
+        };
+        // Opacity rises from 0 at u = 1/4 to 1 at u = 3/4.
+        for (pixels, expected) in [
+            (-1.0, 0.0),
+            (-0.25, 0.25),
+            (0.0, 0.5),
+            (0.25, 0.75),
+            (1.0, 1.0),
+        ] {
+            let found = opacity(0.375 + pixels * step);
+            assert!(
+                (found - expected).abs() < 1e-3,
+                "{found} at {pixels} pixels"
+            );
         }
     }
 }

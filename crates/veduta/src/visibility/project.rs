@@ -1,6 +1,7 @@
 //! Scene -> faces in the image plane.
 //!
-//! Coplanar faces share one plane, taken from the first of them.
+//! Coplanar faces share one plane, taken from the first of them. Faces that are not fully opaque are
+//! marked as veils.
 //!
 //! Each vertex is projected once, into an image plane without size. Objects and faces are sorted
 //! into the classes of Nishita & Nakamae (1979), §4.2: A, wholly inside the view pyramid; B, before
@@ -10,7 +11,7 @@
 //! Neighbours keep bit-equal edges: an edge is clipped from the smaller of its end points, whichever
 //! face asks.
 
-use crate::scene::{FaceIndex, Mesh, Object, PlaneGroups, Scene};
+use crate::scene::{FaceIndex, Mesh, Object, Opacities, Opacity, PlaneGroups, Scene};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use veduta_geometry::{DVec2, DVec3, DVec4, signed_area};
@@ -24,10 +25,12 @@ pub(super) static PROJECTED: AtomicU64 = AtomicU64::new(0);
 
 /// The faces of `scene` that may be seen through `camera`, clipped to the view pyramid.
 ///
-/// Faces turned away from the eye are left out where their material is single-sided. Ids ascend by
+/// Faces turned away from the eye are left out where their material is single-sided, and so are faces
+/// that let all through. Ids ascend by
 /// object in [key order](Scene::key_order), then by face within the object.
 pub fn project(scene: &Scene, camera: &Camera) -> Faces {
     let groups = PlaneGroups::of(scene);
+    let opacities = Opacities::of(scene);
     let mut faces = Faces::new();
     for object in scene.key_order() {
         let mesh = scene.mesh_of(object);
@@ -41,7 +44,7 @@ pub fn project(scene: &Scene, camera: &Camera) -> Faces {
             .into_par_iter()
             .map(|start| {
                 let end = (start + FACES_PER_TASK).min(mesh.face_count());
-                view.project_faces(scene, object, start as u32..end as u32, groups)
+                view.project_faces(scene, object, start as u32..end as u32, groups, &opacities)
             })
             .collect();
         // Each is dropped when it is appended, so that there are never two copies of all.
@@ -137,6 +140,7 @@ impl<'a> ObjectView<'a> {
         object: ObjectId,
         range: std::ops::Range<u32>,
         groups: &[(FaceIndex, FaceIndex)],
+        opacities: &Opacities,
     ) -> Faces {
         let mut faces = Faces::with_capacity(range.len());
         let mut outline = Vec::new();
@@ -170,8 +174,15 @@ impl<'a> ObjectView<'a> {
                 }
             };
             if let Some(nearness) = self.camera.nearness_of_plane(p, (q - p).cross(r - p)) {
+                let opacity = opacities.of_face(object, source);
+                if opacity == Opacity::Absent {
+                    continue;
+                }
                 let plane = faces.push_plane(nearness);
-                faces.push(outline, plane, object, source);
+                let face = faces.push(outline, plane, object, source);
+                if let Some(face) = face.filter(|_| opacity == Opacity::Veil) {
+                    faces.set_veil(face);
+                }
             }
         }
         faces

@@ -92,7 +92,12 @@ fn contains(faces: &Faces, face: FaceId, point: DVec2) -> bool {
 fn is_in_front(faces: &Faces, face: FaceId, other: FaceId, point: DVec2) -> bool {
     let nearness = |face| faces.face_nearness(face).at(point);
     if faces.face_nearness(face) == faces.face_nearness(other) {
-        face < other
+        // A veil on a wall is seen.
+        match (faces.is_veil(face), faces.is_veil(other)) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => face < other,
+        }
     } else {
         nearness(face) > nearness(other)
     }

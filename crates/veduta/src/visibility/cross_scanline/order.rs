@@ -7,9 +7,9 @@ use veduta_map::{FaceId, Faces};
 pub(super) enum Difference {
     /// The first face's nearness minus the second's; not zero everywhere.
     Affine(Affine),
-    /// They share a plane and the first face's id is smaller.
+    /// They share a plane, in which the first face is seen.
     FirstInFront,
-    /// They share a plane and the second face's id is smaller.
+    /// They share a plane, in which the second face is seen.
     SecondInFront,
 }
 
@@ -20,7 +20,7 @@ impl Difference {
         let difference = faces.nearness(plane).minus(faces.nearness(other));
         if plane != other && difference != Affine::default() {
             Self::Affine(difference)
-        } else if first < second {
+        } else if faces.wins_tie(first, second) {
             Self::FirstInFront
         } else {
             Self::SecondInFront
