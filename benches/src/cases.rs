@@ -1,6 +1,7 @@
 //! Scenes to measure on, projected once: what an engine costs begins after projection.
 
 use veduta::accumulate::Picture;
+use veduta::filter::Filter;
 use veduta::map::{Camera, FaceId, Faces, Fragments, VisibilityMap};
 use veduta::pipeline::{RenderSettings, render_map};
 use veduta::scene::{Scene, generate};
@@ -113,14 +114,25 @@ impl Case {
         }
     }
 
-    /// Fills `map`, made by [`Case::empty_map`], and makes its picture.
-    pub fn picture_exactly(&self, map: &mut VisibilityMap) -> Picture {
+    /// Fills `map`, made by [`Case::empty_map`].
+    pub fn find_into(&self, map: &mut VisibilityMap) {
         let Seen { opaque, veils } = self.find_exactly();
         (map.opaque, map.veils) = (opaque, veils);
+    }
+
+    /// Fills `map`, made by [`Case::empty_map`], and makes its picture.
+    pub fn picture_exactly(&self, map: &mut VisibilityMap) -> Picture {
+        self.find_into(map);
+        self.picture_of(map, Filter::Box)
+    }
+
+    /// The picture of a map of the case.
+    pub fn picture_of(&self, map: &VisibilityMap, filter: Filter) -> Picture {
         let settings = RenderSettings {
             width: self.width,
             height: self.height,
             unlit: true,
+            filter,
             ..RenderSettings::default()
         };
         render_map(&self.scene, map, &settings)
@@ -154,7 +166,7 @@ mod tests {
             let case = Case::parse(title).expect("a sound title");
             let exact = case.picture_exactly(&mut case.empty_map());
             let spans = multiscan::find_spans(&case.faces, case.width, case.height, 128);
-            let scanned = spans.picture(|face| case.color(face));
+            let scanned = multiscan::picture(&spans, |face| case.color(face));
             let mut buffer = ZBuffer::new(32 * case.width, 32 * case.height);
             buffer.find(&case.faces);
             let mut sampled = case.empty_picture();

@@ -5,10 +5,11 @@ use crate::timing::{least_times, milliseconds};
 use std::hint::black_box;
 use std::io::Cursor;
 use veduta::composite::composite;
+use veduta::dice::PixelGrid;
 use veduta::geometry::DVec2;
-use veduta::map::SeenScene;
 use veduta::map::file::{MapReader, write_map};
-use veduta::pipeline::find_visibility;
+use veduta::map::{Origin, SeenScene};
+use veduta::pipeline::{find_visibility, render_window};
 use veduta::scene::{MeshId, Scene};
 
 /// Rounds of measuring.
@@ -33,9 +34,18 @@ pub struct StoredTimes {
     pub bytes: usize,
     /// Bytes of a face that is stored.
     pub bytes_per_face: f64,
-    /// Share of the bytes that a window of a sixteenth of the frame reads.
+    /// The largest share of the bytes that a window of a sixteenth of the frame reads, over 49 places.
     pub window: f64,
+    /// Share of the fragments that touch that window.
+    pub in_window: f64,
+    /// Pixels of a map that was just made, at [`ZOOM`] times the size.
+    pub pixels: f64,
+    /// Pixels of the stored map at that scale.
+    pub zoom: f64,
 }
+
+/// Scale of x and of y.
+const ZOOM: [f64; 2] = [1.5, 1.25];
 
 /// Measures a case whose faces are dealt to files in blocks, as parts of a model would be.
 pub fn stored_times(case: &Case) -> StoredTimes {
@@ -49,7 +59,13 @@ pub fn stored_times(case: &Case) -> StoredTimes {
     let read =
         |bytes: &[u8]| MapReader::new(Cursor::new(bytes.to_vec())).and_then(|mut map| map.read());
     let merged = |maps: &[SeenScene]| composite(maps).expect("maps of one camera");
-    let [find, two, eight, chain, write, read] = least_times(
+    let fresh = find_visibility(&case.scene, &case.camera);
+    let frame = DVec2::from(ZOOM) * DVec2::new(case.width.into(), case.height.into());
+    let grid = PixelGrid {
+        pixels_per_frame: frame,
+        ..PixelGrid::of_frame(frame.x as u32, frame.y as u32)
+    };
+    let [find, two, eight, chain, write, read, pixels, zoom] = least_times(
         ROUNDS,
         [
             &mut || drop(black_box(find_visibility(&case.scene, &case.camera))),
@@ -61,12 +77,12 @@ pub fn stored_times(case: &Case) -> StoredTimes {
             },
             &mut || drop(black_box(written(&all))),
             &mut || drop(black_box(read(&bytes).expect("sound"))),
+            &mut || drop(black_box(render_window(&case.scene, &fresh, &grid, true))),
+            &mut || drop(black_box(render_window(&all.scene, &all.map, &grid, true))),
         ],
     )
     .map(milliseconds);
-    let mut reader = MapReader::new(Cursor::new(bytes.as_slice())).expect("sound");
-    let window = [DVec2::splat(0.5), DVec2::splat(0.75)];
-    reader.read_window(window).expect("sound");
+    let [window, in_window] = worst_window(&all, &bytes);
     StoredTimes {
         find,
         two,
@@ -76,12 +92,45 @@ pub fn stored_times(case: &Case) -> StoredTimes {
         read,
         bytes: bytes.len(),
         bytes_per_face: bytes.len() as f64 / all.map.faces.len().max(1) as f64,
-        window: reader.bytes_read() as f64 / bytes.len() as f64,
+        window,
+        in_window,
+        pixels,
+        zoom,
     }
 }
 
+/// Of the windows of a sixteenth of the frame the one that reads most: shares of the bytes, and of the
+/// faces that touch it.
+fn worst_window(seen: &SeenScene, bytes: &[u8]) -> [f64; 2] {
+    let boxes: Vec<[DVec2; 2]> = seen
+        .map
+        .opaque
+        .iter()
+        .map(|fragment| {
+            let polygon = seen.map.polygon(fragment).iter();
+            polygon.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[min, max], &p| {
+                [min.min(p), max.max(p)]
+            })
+        })
+        .collect();
+    let mut worst = [0.0, 0.0];
+    for place in 0..49 {
+        let min = DVec2::new(f64::from(place % 7), f64::from(place / 7)) / 8.0;
+        let max = min + 0.25;
+        let mut reader = MapReader::new(Cursor::new(bytes)).expect("sound");
+        reader.read_window([min, max]).expect("sound");
+        let share = reader.bytes_read() as f64 / bytes.len() as f64;
+        if share > worst[0] {
+            let touches = |[low, high]: &[DVec2; 2]| low.cmple(max).all() && high.cmpge(min).all();
+            let inside = boxes.iter().filter(|bounds| touches(bounds)).count();
+            worst = [share, inside as f64 / boxes.len() as f64];
+        }
+    }
+    worst
+}
+
 fn written(seen: &SeenScene) -> Vec<u8> {
-    let out = write_map(Cursor::new(Vec::new()), seen, &[]);
+    let out = write_map(Cursor::new(Vec::new()), seen, &Origin::default());
     out.expect("memory takes all").into_inner()
 }
 

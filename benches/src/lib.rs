@@ -6,6 +6,7 @@
 
 pub mod cases;
 pub mod composite;
+pub mod deep;
 pub mod exchange;
 pub mod fit;
 pub mod glb;

@@ -7,10 +7,12 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::ExitCode;
 use veduta::accumulate::Picture;
+use veduta::filter::Filter;
 use veduta::map::VisibilityMap;
 use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
 use veduta_bench::composite::stored_times;
+use veduta_bench::deep;
 use veduta_bench::fit::Line;
 use veduta_bench::peers;
 use veduta_bench::table::Table;
@@ -22,22 +24,29 @@ Usage: veduta-bench TABLE [SCENE[@WIDTHxHEIGHT]...]
        veduta-bench export SCENE[@WIDTHxHEIGHT] FILE
        veduta-bench reference SCENE[@WIDTHxHEIGHT] FILE.npy
        veduta-bench own SCENE[@WIDTHxHEIGHT] EXPORTED_FILE PICTURE.npy
+       veduta-bench deep PAIR SAMPLES FOLDER
+       veduta-bench difference EXACT_PICTURE PICTURE
 
 Tables:
   n-et      multiscan with n sub-scanlines, the slope and intercept of its time over n, and
             the n that costs as much as the exact picture (Tanaka & Takahashi 1991, table 1)
   zbuffer   the exact map, and picture, against a z-buffer with one sample a pixel
   engines   all methods, supersampling included
-  stored    stored maps: compositing two and eight, writing, reading, a window of a sixteenth
+  stored    stored maps: compositing two and eight, writing, reading, a window of a sixteenth, zoom
+  filters   pixels of a map by each filter, and as a ratio to the box filter
 
-Columns: map is the exact map alone, exact the map and its pixels.
+Columns: map is the exact map alone, exact the map and its pixels. Window reads: the largest share of
+the bytes over 49 windows, and the share of the fragments that touch that window. Pixels: those of a map made
+anew, and those of the stored map, both at 1.5 x 1.25 times the size.
 
 Without scenes, those that the documentation tells of.
 
 For benches/peers:
   export     the scene in a file that the other programs read
   reference  its exact picture in flat colours
-  own        our CPU seconds to that picture, as JSON";
+  own        our CPU seconds to that picture, as JSON
+  deep       two scenes as stored maps and as deep pictures of SAMPLES x SAMPLES samples a pixel
+  difference  how many pixels of a picture are off, as JSON";
 
 /// Rounds of measuring, for scenes that do not take long.
 const ROUNDS: u32 = 5;
@@ -50,7 +59,7 @@ struct Measurement {
     row: fn(&Case) -> Vec<String>,
 }
 
-const MEASUREMENTS: [Measurement; 4] = [
+const MEASUREMENTS: [Measurement; 5] = [
     Measurement {
         name: "stored",
         scenes: &[
@@ -74,8 +83,26 @@ const MEASUREMENTS: [Measurement; 4] = [
             "kB",
             "bytes a face",
             "window reads",
+            "seen there",
+            "pixels",
+            "zoom, pixels",
+            "ratio",
         ],
         row: stored,
+    },
+    Measurement {
+        name: "filters",
+        scenes: &["balls7", "bridge@1920x1080", "field1m@1920x1080"],
+        titles: &[
+            "scene, ms",
+            "map",
+            "box",
+            "triangle",
+            "ratio",
+            "mitchell",
+            "ratio",
+        ],
+        row: filters,
     },
     Measurement {
         name: "n-et",
@@ -170,6 +197,10 @@ fn main() -> ExitCode {
         ("own", [title, file, picture]) => Case::parse(title)
             .and_then(|case| peers::own_times(&case, Path::new(file), Path::new(picture)))
             .map(|times| println!("{times}")),
+        ("deep", [pair, samples, folder]) => write_deep(pair, samples, folder),
+        ("difference", [exact, picture]) => {
+            deep::difference(Path::new(exact), Path::new(picture)).map(|told| println!("{told}"))
+        }
         _ => print_table(name, scenes),
     };
     match done {
@@ -179,6 +210,22 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Writes the files of a pair of scenes into a folder.
+///
+/// # Errors
+/// A sentence about what is wrong with the arguments, or could not be written.
+fn write_deep(pair: &str, samples: &str, folder: &str) -> Result<(), String> {
+    let count = samples
+        .parse()
+        .ok()
+        .filter(|samples| (1..=64).contains(samples));
+    let count =
+        count.ok_or_else(|| format!("{samples} is not a number of samples from 1 to 64"))?;
+    let told = deep::Pair::by_name(pair)?.write(Path::new(folder), count)?;
+    println!("{told}");
+    Ok(())
 }
 
 /// Measures and prints the table `name`.
@@ -277,6 +324,37 @@ fn stored(case: &Case) -> Vec<String> {
         (times.bytes / 1000).to_string(),
         format!("{:.0}", times.bytes_per_face),
         format!("{:.3}", times.window),
+        format!("{:.3}", times.in_window),
+        ms(times.pixels),
+        ms(times.zoom),
+        format!("{:.2}", times.zoom / times.pixels),
+    ]
+}
+
+/// From a map to pixels, by filters of radius 1/2, 1 and 2. All cubics take as long as Mitchell's.
+fn filters(case: &Case) -> Vec<String> {
+    let mut map = case.empty_map();
+    case.find_into(&mut map);
+    let picture = |filter| black_box(case.picture_of(&map, filter));
+    let [find, sharp, triangle, mitchell] = least_times(
+        ROUNDS,
+        [
+            &mut || exact_map(case),
+            &mut || drop(picture(Filter::Box)),
+            &mut || drop(picture(Filter::Triangle)),
+            &mut || drop(picture(Filter::Mitchell)),
+        ],
+    )
+    .map(milliseconds);
+    let ratio = |time: f64| format!("{:.1}", time / sharp);
+    vec![
+        case.title(),
+        ms(find),
+        ms(sharp),
+        ms(triangle),
+        ratio(triangle),
+        ms(mitchell),
+        ratio(mitchell),
     ]
 }
 
@@ -314,7 +392,7 @@ fn exact_picture(case: &Case, map: &mut VisibilityMap) {
 
 fn multiscan_picture(case: &Case, n: u32) {
     let spans = multiscan::find_spans(&case.faces, case.width, case.height, n);
-    black_box(spans.picture(|face| case.color(face)));
+    black_box(multiscan::picture(&spans, |face| case.color(face)));
 }
 
 /// A z-buffer with `n` x `n` samples for each pixel, and the picture made of it.

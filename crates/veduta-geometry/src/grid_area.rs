@@ -49,6 +49,21 @@ pub enum Cells<A = f64> {
     },
 }
 
+impl<A> Cells<A> {
+    /// The same cells, with `measured` of what was measured.
+    #[inline(always)]
+    pub fn map<B>(self, measured: impl FnOnce(A) -> B) -> Cells<B> {
+        match self {
+            Self::Boundary { column, row, area } => Cells::Boundary {
+                column,
+                row,
+                area: measured(area),
+            },
+            Self::Inside { row, columns } => Cells::Inside { row, columns },
+        }
+    }
+}
+
 /// Area and first moments of what is covered of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CellArea {
@@ -128,9 +143,9 @@ impl GridAreas {
     }
 }
 
-/// What is measured of a region of a cell: its area, or its area and first moments. Coordinates are
-/// relative to the cell's top left corner.
-trait Measure:
+/// What is measured of a region of a cell: its area, or moments too. Coordinates are relative to the
+/// cell's top left corner.
+pub(crate) trait Measure:
     Copy + Default + AddAssign + SubAssign + Sub<Output = Self> + Mul<f64, Output = Self>
 {
     /// The whole width of the cell from `top` to `bottom`.
@@ -239,8 +254,9 @@ impl Sub for CellArea {
     }
 }
 
+/// Walks a polygon as [`GridAreas::each_cell`] tells, whatever is measured.
 #[inline(always)]
-fn walk<A: Measure>(
+pub(crate) fn walk<A: Measure>(
     polygon: &[DVec2],
     columns: u32,
     rows: Range<u32>,
@@ -358,7 +374,7 @@ fn max(a: f64, b: f64) -> f64 {
 
 /// Area, and moments, of a polygon inside the cell at `corner`.
 #[inline(always)]
-fn fan<A: Measure>(polygon: &[DVec2], corner: DVec2) -> A {
+pub(crate) fn fan<A: Measure>(polygon: &[DVec2], corner: DVec2) -> A {
     let first = polygon[0];
     let mut sum = A::default();
     for edge in polygon[1..].windows(2) {
@@ -567,7 +583,7 @@ impl Segment {
 
 /// Sums up the strips of one row.
 #[derive(Clone, Debug, Default)]
-struct RowBuffer<A> {
+pub(crate) struct RowBuffer<A> {
     /// By column; all zero between rows.
     cells: Vec<A>,
     /// Columns that the strips touch.

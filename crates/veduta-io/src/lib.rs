@@ -7,11 +7,21 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "stl",
+    feature = "ply",
+    feature = "cityjson",
+    feature = "toml"
+))]
+mod casters;
 #[cfg(feature = "exr")]
 pub mod deep_exr;
 #[cfg(feature = "exr")]
 pub mod depth_picture;
 mod map_file;
+mod object_names;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",
@@ -27,7 +37,20 @@ mod scale;
 pub mod tone;
 mod write;
 
-pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, source_of, write_map};
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "stl",
+    feature = "ply",
+    feature = "cityjson",
+    feature = "toml"
+))]
+pub use casters::{
+    CastersError, SourceError, SourceProblem, check_source, choose_objects, read_casters,
+    reading_of,
+};
+pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, write_map, write_spans};
+pub use object_names::ObjectNames;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",

@@ -114,9 +114,12 @@ pub fn filmic(x: f32) -> f32 {
 }
 
 /// Lays the picture on a background of one linear colour; all pixels become opaque.
+///
+/// Where a filter with lobes below 0 made an opacity of more than 1, the background counts negative:
+/// white on white stays white.
 pub fn lay_on(picture: &mut Picture, background: [f32; 3]) {
     picture.pixels.par_iter_mut().for_each(|pixel| {
-        let rest = (1.0 - pixel[3]).max(0.0);
+        let rest = 1.0 - pixel[3];
         for (channel, background) in pixel.iter_mut().zip(background) {
             *channel += rest * background;
         }
@@ -132,7 +135,7 @@ pub fn lay_on_picture(picture: &mut Picture, background: &Picture) {
         .par_iter_mut()
         .zip(background.pixels.par_iter());
     pairs.for_each(|(pixel, behind)| {
-        let rest = (1.0 - pixel[3]).max(0.0);
+        let rest = 1.0 - pixel[3];
         for (channel, behind) in pixel.iter_mut().zip(behind) {
             *channel += rest * behind;
         }

@@ -65,13 +65,6 @@ impl Faces {
         object: ObjectId,
         source: u32,
     ) -> Option<FaceId> {
-        assert!(
-            plane.index() < self.planes.len(),
-            "a face needs a plane of this table"
-        );
-        if self.outline_start.is_empty() {
-            self.outline_start.push(0);
-        }
         let start = self.vertices.len();
         if veduta_geometry::signed_area(outline) > 0.0 {
             self.vertices.extend_from_slice(outline);
@@ -84,6 +77,38 @@ impl Faces {
                 return None;
             }
         }
+        Some(self.end_row(plane, object, source))
+    }
+
+    /// Adds a face of another table, with what is to be said of it here.
+    ///
+    /// # Panics
+    /// If the plane is not one of this table.
+    pub fn push_row(
+        &mut self,
+        other: &Self,
+        face: FaceId,
+        plane: PlaneId,
+        object: ObjectId,
+        source: u32,
+    ) -> FaceId {
+        self.vertices.extend_from_slice(other.outline(face));
+        let id = self.end_row(plane, object, source);
+        if other.is_veil(face) {
+            self.set_veil(id);
+        }
+        id
+    }
+
+    /// Adds a face whose outline was put at the end of the vertices.
+    fn end_row(&mut self, plane: PlaneId, object: ObjectId, source: u32) -> FaceId {
+        assert!(
+            plane.index() < self.planes.len(),
+            "a face needs a plane of this table"
+        );
+        if self.outline_start.is_empty() {
+            self.outline_start.push(0);
+        }
         let id = FaceId::from_index(self.plane.len());
         self.outline_start
             .push(u32::try_from(self.vertices.len()).expect("at most u32::MAX vertices"));
@@ -93,7 +118,7 @@ impl Faces {
         if !self.veil.is_empty() {
             self.veil.push(false);
         }
-        Some(id)
+        id
     }
 
     /// Gives `face` the plane of `other`: they are coplanar, and the smaller id is seen.

@@ -165,6 +165,11 @@ impl Fragments {
         }
     }
 
+    /// The columns, as [`Fragments::from_columns`] takes them.
+    pub fn columns(&self) -> (&[(FaceId, u32)], &[DVec2], &[Side]) {
+        (&self.entries, &self.vertices, &self.sides)
+    }
+
     /// Number of fragments.
     pub fn len(&self) -> usize {
         self.entries.len()

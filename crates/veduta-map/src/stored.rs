@@ -1,6 +1,8 @@
 use crate::scene::{ImageId, Layer, Material, Mesh, MeshId, Object, Scene, TextureRef};
-use crate::{FaceId, Faces, Fragment, Fragments, MaterialId, ObjectId, Side, VisibilityMap};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::{
+    FaceId, Faces, Fragment, Fragments, MaterialId, ObjectId, PlaneId, Side, VisibilityMap,
+};
+use std::collections::BTreeSet;
 
 /// A visibility map together with what is seen of its scene: all that pictures are made of.
 ///
@@ -22,23 +24,57 @@ pub struct SeenScene {
     pub size: [u32; 2],
 }
 
+/// The mesh of an object, wherever it is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct ObjectMesh<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// What is to be added to the numbers of its materials.
+    pub first_material: u32,
+}
+
 impl SeenScene {
     /// What `map` shows of `scene`, in normal form.
     ///
     /// # Panics
     /// If `map` is not a map of `scene`.
     pub fn of(scene: &Scene, map: &VisibilityMap, size: [u32; 2]) -> Self {
+        let objects = (0..scene.objects.len()).map(ObjectId::from_index);
+        let meshes: Vec<ObjectMesh> = objects
+            .map(|object| ObjectMesh {
+                mesh: scene.mesh_of(object),
+                first_material: 0,
+            })
+            .collect();
+        Self::of_meshes(scene, &meshes, map, size)
+    }
+
+    /// [`SeenScene::of`] a scene whose meshes are kept elsewhere: `meshes` are those of its objects. So
+    /// scenes can be put together without copies of all that is in them.
+    ///
+    /// # Panics
+    /// If `map` is not a map of `scene`.
+    pub fn of_meshes(
+        scene: &Scene,
+        meshes: &[ObjectMesh],
+        map: &VisibilityMap,
+        size: [u32; 2],
+    ) -> Self {
         let faces = faces_named(map);
-        let new_id = |face: FaceId| FaceId::from_index(faces.partition_point(|&f| f < face));
-        let mut meshes = SeenMeshes::new(scene, &map.faces, &faces);
+        let mut new_ids = vec![FaceId(u32::MAX); map.faces.len()];
+        for (&face, index) in faces.iter().zip(0..) {
+            new_ids[face.index()] = FaceId(index);
+        }
+        let new_id = |face: FaceId| new_ids[face.index()];
+        let seen = SeenMeshes::new(meshes, &map.faces, &faces);
         Self {
             map: VisibilityMap {
                 camera: map.camera,
-                faces: meshes.renumber(&map.faces, &faces),
+                faces: seen.renumber(&map.faces, &faces),
                 opaque: map.opaque.renumbered(new_id),
                 veils: map.veils.renumbered(new_id),
             },
-            scene: meshes.into_scene(scene),
+            scene: seen.into_scene(scene),
             size,
         }
     }
@@ -94,25 +130,35 @@ impl Fragments {
 
     /// The same fragments of faces with other numbers, in their order.
     pub fn renumbered(&self, new_id: impl Fn(FaceId) -> FaceId) -> Self {
-        let mut order: Vec<usize> = (0..self.len()).collect();
+        let (entries, vertices, sides) = self.columns();
+        let entries: Vec<(FaceId, u32)> = entries
+            .iter()
+            .map(|&(face, first)| (new_id(face), first))
+            .collect();
+        let sides = sides.iter().map(|side| Side {
+            face: new_id(side.face),
+            ..*side
+        });
+        let sides: Vec<Side> = sides.collect();
+        // Most renumberings only close gaps.
+        if entries.is_sorted_by_key(|entry| entry.0) {
+            return Self::from_columns(entries, vertices.to_vec(), sides);
+        }
+        let mut order: Vec<usize> = (0..entries.len()).collect();
         // Stable: the fragments of a face stay in order.
-        order.sort_by_key(|&index| new_id(self.face(index)));
+        order.sort_by_key(|&index| entries[index].0);
         let mut renumbered = Self::new();
         for index in order {
-            match self.get(index) {
-                Fragment::Whole(face) => renumbered.push_whole(new_id(face)),
-                Fragment::Cut {
-                    face,
-                    vertices,
-                    sides,
-                } => {
-                    let side = |side: &Side| Side {
-                        face: new_id(side.face),
-                        ..*side
-                    };
-                    let corners = vertices.iter().copied().zip(sides.iter().map(side));
-                    renumbered.push_cut(new_id(face), corners);
-                }
+            let (face, start) = entries[index];
+            let end = entries
+                .get(index + 1)
+                .map_or(vertices.len(), |next| next.1 as usize);
+            let corners = start as usize..end;
+            if corners.is_empty() {
+                renumbered.push_whole(face);
+            } else {
+                let points = vertices[corners.clone()].iter().copied();
+                renumbered.push_cut(face, points.zip(sides[corners].iter().copied()));
             }
         }
         renumbered
@@ -121,67 +167,87 @@ impl Fragments {
 
 /// What is seen of each object.
 struct SeenMeshes {
-    /// Of each seen object, its faces (rows of its mesh), ascending.
-    faces: BTreeMap<ObjectId, Vec<u32>>,
+    /// The seen objects, ascending.
+    objects: Vec<ObjectId>,
+    /// Of each of them, its seen faces (rows of its mesh), ascending.
+    faces: Vec<Vec<u32>>,
     meshes: Vec<Mesh>,
     materials: Vec<MaterialId>,
 }
 
 impl SeenMeshes {
-    fn new(scene: &Scene, table: &Faces, seen: &[FaceId]) -> Self {
-        let mut faces: BTreeMap<ObjectId, Vec<u32>> = BTreeMap::new();
+    fn new(meshes: &[ObjectMesh], table: &Faces, seen: &[FaceId]) -> Self {
+        let mut faces: Vec<Vec<u32>> = vec![Vec::new(); meshes.len()];
         for &face in seen {
-            faces
-                .entry(table.object(face))
-                .or_default()
-                .push(table.source(face));
+            faces[table.object(face).index()].push(table.source(face));
         }
-        for sources in faces.values_mut() {
-            sources.sort_unstable();
-            sources.dedup();
-        }
-        let mut meshes: Vec<Mesh> = faces
-            .iter()
-            .map(|(&object, sources)| scene.mesh_of(object).selected(sources))
+        let objects: Vec<ObjectId> = (0..meshes.len())
+            .filter(|&object| !faces[object].is_empty())
+            .map(ObjectId::from_index)
             .collect();
-        let materials: BTreeSet<MaterialId> = meshes
+        faces.retain_mut(|faces| {
+            faces.sort_unstable();
+            faces.dedup();
+            !faces.is_empty()
+        });
+        let mut selected: Vec<Mesh> = Vec::with_capacity(objects.len());
+        for (object, faces) in objects.iter().zip(&faces) {
+            let ObjectMesh {
+                mesh,
+                first_material,
+            } = meshes[object.index()];
+            let mut mesh = mesh.selected(faces);
+            for (_, material) in &mut mesh.materials {
+                material.0 += first_material;
+            }
+            selected.push(mesh);
+        }
+        let materials: BTreeSet<MaterialId> = selected
             .iter()
             .flat_map(|mesh| mesh.materials.iter().map(|range| range.1))
             .collect();
         let materials: Vec<MaterialId> = materials.into_iter().collect();
-        for mesh in &mut meshes {
+        for mesh in &mut selected {
             for (_, material) in &mut mesh.materials {
                 *material = MaterialId::from_index(row_of(&materials, *material));
             }
         }
         Self {
+            objects,
             faces,
-            meshes,
+            meshes: selected,
             materials,
         }
     }
 
     /// The rows `seen` of a table of faces, with objects, sources and planes as they are numbered now.
-    fn renumber(&mut self, table: &Faces, seen: &[FaceId]) -> Faces {
-        let objects: Vec<ObjectId> = self.faces.keys().copied().collect();
-        let planes: BTreeSet<_> = seen.iter().map(|&face| table.plane(face)).collect();
-        let planes: Vec<_> = planes.into_iter().collect();
-        let mut faces = Faces::with_capacity(seen.len());
-        let new_planes: Vec<_> = planes
-            .iter()
-            .map(|&plane| faces.push_plane(*table.nearness(plane)))
-            .collect();
+    fn renumber(&self, table: &Faces, seen: &[FaceId]) -> Faces {
+        let mut is_named = vec![false; table.planes().len()];
         for &face in seen {
-            let object = table.object(face);
-            let source = row_of(&self.faces[&object], table.source(face)) as u32;
-            let plane = new_planes[row_of(&planes, table.plane(face))];
-            let object = ObjectId::from_index(row_of(&objects, object));
-            let id = faces
-                .push(table.outline(face), plane, object, source)
-                .expect("a face of a table has an area");
-            if table.is_veil(face) {
-                faces.set_veil(id);
+            is_named[table.plane(face).index()] = true;
+        }
+        let mut faces = Faces::with_capacity(seen.len());
+        let mut new_planes = vec![PlaneId(u32::MAX); is_named.len()];
+        for (new, (&nearness, is_named)) in new_planes
+            .iter_mut()
+            .zip(table.planes().iter().zip(is_named))
+        {
+            if is_named {
+                *new = faces.push_plane(nearness);
             }
+        }
+        // Faces mostly follow one another in their mesh too.
+        let mut expected = vec![0; self.objects.len()];
+        for &face in seen {
+            let object = row_of(&self.objects, table.object(face));
+            let (of_object, source) = (&self.faces[object], table.source(face));
+            if of_object.get(expected[object]) != Some(&source) {
+                expected[object] = row_of(of_object, source);
+            }
+            let new_source = expected[object] as u32;
+            expected[object] += 1;
+            let plane = new_planes[table.plane(face).index()];
+            faces.push_row(table, face, plane, ObjectId::from_index(object), new_source);
         }
         faces
     }
@@ -208,7 +274,7 @@ impl SeenMeshes {
                 *image = ImageId(row_of(&images, *image) as u32);
             }
         }
-        let seen: Vec<ObjectId> = self.faces.keys().copied().collect();
+        let seen = self.objects;
         let before = |object: u32| seen.partition_point(|seen| seen.0 < object) as u32;
         Scene {
             objects: seen
@@ -249,21 +315,32 @@ impl Mesh {
     /// The faces of these rows, ascending, with the vertices that they have, in the order in which they
     /// first have them.
     pub fn selected(&self, faces: &[u32]) -> Self {
+        const UNSEEN: u32 = u32::MAX;
         let mut selected = Self::default();
-        let mut new_row = vec![None; self.positions.len()];
+        selected.triangles.reserve(faces.len());
+        let mut new_row = vec![UNSEEN; self.positions.len()];
         let mut rows = Vec::new();
+        let mut corners = Vec::new();
+        let mut range = 0;
         for &face in faces {
-            let corners: Vec<u32> = self
-                .corners_of(face)
-                .map(|vertex| {
-                    *new_row[vertex as usize].get_or_insert_with(|| {
-                        rows.push(vertex as usize);
-                        rows.len() as u32 - 1
-                    })
-                })
-                .collect();
+            corners.clear();
+            corners.extend(self.corners_of(face).map(|vertex| {
+                let new_row = &mut new_row[vertex as usize];
+                if *new_row == UNSEEN {
+                    *new_row = rows.len() as u32;
+                    rows.push(vertex as usize);
+                }
+                *new_row
+            }));
             selected.push_fan(&corners);
-            let material = self.material_of(face);
+            while self
+                .materials
+                .get(range + 1)
+                .is_some_and(|next| next.0 <= face)
+            {
+                range += 1;
+            }
+            let material = self.materials[range].1;
             if selected
                 .materials
                 .last()
@@ -286,5 +363,35 @@ impl Mesh {
         selected.colors = of_rows(&self.colors, &rows);
         selected.opacities = of_rows(&self.opacities, &rows);
         selected
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use veduta_geometry::DVec2;
+
+    #[test]
+    fn renumbered_fragments_stand_in_the_order_of_their_new_faces() {
+        let corner = |k: u32, face: u32| {
+            let point = DVec2::new(f64::from(k), f64::from(face));
+            (point, Side::crossing(FaceId(face)))
+        };
+        let cut = |face: u32| (0..3).map(move |k| corner(k, face));
+        let mut fragments = Fragments::new();
+        fragments.push_cut(FaceId(0), cut(2).collect::<Vec<_>>().into_iter());
+        fragments.push_cut(FaceId(0), cut(1).collect::<Vec<_>>().into_iter());
+        fragments.push_whole(FaceId(1));
+        let found = fragments.renumbered(|face| FaceId(9 - face.0));
+        let mut expected = Fragments::new();
+        expected.push_whole(FaceId(8));
+        for face in [2, 1] {
+            let corners = cut(face).map(|(point, _)| (point, Side::crossing(FaceId(9 - face))));
+            expected.push_cut(FaceId(9), corners.collect::<Vec<_>>().into_iter());
+        }
+        assert_eq!(found, expected);
+        // Numbers that only close gaps keep the order.
+        let same = fragments.renumbered(|face| face);
+        assert_eq!(same, fragments);
     }
 }

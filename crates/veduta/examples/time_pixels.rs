@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 use veduta::dice::{Bands, Dicer, Parts, PixelGrid, dice};
+use veduta::filter::Filter;
 use veduta::geometry::{DMat4, DVec2, DVec3, Vec3};
 use veduta::map::{
     Affine, Camera, Faces, Fragments, MaterialId, ObjectId, Projection, VisibilityMap,
@@ -44,16 +45,20 @@ fn main() {
                 scene.meshes[0].texcoords.clear();
                 scene
             };
-            for (name, unlit, scene) in [
-                ("picture, unlit", true, flat(&scene)),
-                ("picture, flat faces in light", false, flat(&scene)),
-                ("picture, smooth normals", false, smooth(&scene)),
-                ("picture, smooth and textured", false, scene),
+            let (sharp, wide) = (Filter::Box, Filter::Mitchell);
+            for (name, unlit, filter, scene) in [
+                ("picture, unlit", true, sharp, flat(&scene)),
+                ("picture, flat faces in light", false, sharp, flat(&scene)),
+                ("picture, smooth normals", false, sharp, smooth(&scene)),
+                ("filtered, smooth normals", false, wide, smooth(&scene)),
+                ("picture, smooth and textured", false, sharp, scene.clone()),
+                ("filtered, smooth and textured", false, wide, scene),
             ] {
                 let settings = RenderSettings {
                     width,
                     height,
                     unlit,
+                    filter,
                     ..RenderSettings::default()
                 };
                 report(name, || drop(render_map(&scene, &map, &settings)));

@@ -13,9 +13,11 @@ mod clip;
 pub mod composite;
 pub mod dice;
 pub mod drawing;
+pub mod filter;
 pub mod pipeline;
 pub mod scene;
 pub mod shade;
+mod sweep;
 pub mod visibility;
 
 pub use veduta_geometry as geometry;

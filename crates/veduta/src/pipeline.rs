@@ -1,29 +1,33 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
-//! the light, `pipeline/deep.rs` for deep pictures, `pipeline/frames.rs` for animations and
-//! `pipeline/local.rs` for parts of pictures.
+//! the light, `pipeline/deep.rs` for deep pictures, `pipeline/filtered.rs` for filters that reach beyond
+//! the pixel, `pipeline/frames.rs` for animations and `pipeline/local.rs` for parts of pictures.
 
 mod aovs;
 mod deep;
+mod filtered;
 mod frames;
 mod local;
 
-pub use deep::render_deep;
+pub use deep::{deep_window, render_deep};
 pub use frames::{Extent, FrameStep, FrameWork, Frames};
 pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer, VeilBuffers};
 use crate::drawing::{self, Drawing, Evenness, Look};
+use crate::filter::Filter;
 use crate::scene::{Opacities, Opacity, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
-use crate::visibility::multiscan::{self, Spans};
+use crate::visibility::multiscan;
 use crate::visibility::{self, Seen, Strips, speculative};
 use aovs::{AovBuffers, AovMaker};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
-use veduta_map::{Camera, FaceId, Faces, MaterialId, VisibilityMap};
+use veduta_map::{
+    Camera, FaceId, Faces, MaterialId, SeenSpans, Spans, TooFewSubScanlines, VisibilityMap,
+};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,18 +40,22 @@ pub struct RenderSettings {
     pub sampling: Sampling,
     /// Materials show their colour as it is, without light.
     pub unlit: bool,
+    /// How what is seen around a pixel's centre is weighed. Channels beside the light and deep pictures are
+    /// those of pixels, whatever the filter.
+    pub filter: Filter,
     /// Channels that are made beside the light.
     pub aovs: AovSettings,
 }
 
 impl Default for RenderSettings {
-    /// 1280 x 720, exact, lit, light alone.
+    /// 1280 x 720, exact, lit, by area, light alone.
     fn default() -> Self {
         Self {
             width: 1280,
             height: 720,
             sampling: Sampling::Exact,
             unlit: false,
+            filter: Filter::Box,
             aovs: AovSettings::default(),
         }
     }
@@ -133,7 +141,8 @@ fn map_of(camera: &Camera, faces: Faces, strip: [f64; 2]) -> VisibilityMap {
 /// Whether or not changes nothing that can be seen: areas are exact either way.
 ///
 /// # Panics
-/// If the size is 0, or the picture is too large for the machine's memory.
+/// If the size is 0, the picture is too large for the machine's memory, or `settings` ask for another filter
+/// than the box with [`Sampling::Multiscan`]: spans have no regions to weigh.
 pub fn render(
     scene: &Scene,
     camera: &Camera,
@@ -144,10 +153,20 @@ pub fn render(
     begin(Step::Projecting);
     let faces = visibility::project(scene, camera);
     if let Sampling::Multiscan(n) = settings.sampling {
+        assert!(
+            settings.filter == Filter::Box,
+            "what multiscan finds is summed by area"
+        );
         begin(Step::FindingVisibility);
         let spans = multiscan::find_spans(&faces, grid.width, grid.height, n);
         begin(Step::Shading);
-        return render_spans(scene, camera, &faces, &spans, settings);
+        let (unlit, aovs) = (settings.unlit, settings.aovs);
+        let (picture, aovs) = paint_spans(scene, camera, &faces, &spans, &grid, unlit, aovs);
+        return Rendered {
+            picture,
+            aovs,
+            shortcomings: veils_left_out(&faces),
+        };
     }
     if faces.len() > grid.pixel_count() {
         let strips = faces.len().div_ceil(FACES_PER_STRIP);
@@ -156,7 +175,13 @@ pub fn render(
     begin(Step::FindingVisibility);
     let map = map_of(camera, faces, [0.0, 1.0]);
     begin(Step::Shading);
-    let (picture, aovs) = render_channels(scene, &map, &grid, settings.unlit, settings.aovs);
+    let RenderSettings {
+        unlit,
+        filter,
+        aovs,
+        ..
+    } = *settings;
+    let (picture, aovs) = render_channels(scene, &map, &grid, unlit, filter, aovs);
     Rendered {
         picture,
         aovs,
@@ -175,18 +200,21 @@ pub fn render_map(scene: &Scene, map: &VisibilityMap, settings: &RenderSettings)
         "the pixels of a map are found exactly"
     );
     let grid = PixelGrid::of_frame(settings.width, settings.height);
-    render_window(scene, map, &grid, settings.unlit)
+    let (unlit, filter, aovs) = (settings.unlit, settings.filter, AovSettings::default());
+    render_channels(scene, map, &grid, unlit, filter, aovs).0
 }
 
-/// Makes the picture of a map of `scene` on any grid of pixels: scaled, or a window of it.
+/// Makes the picture of a map of `scene` on any grid of pixels: scaled, or a window of it. By area.
 ///
 /// # Panics
 /// If the picture is too large for the machine's memory.
 pub fn render_window(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Picture {
-    render_channels(scene, map, grid, unlit, AovSettings::default()).0
+    render_channels(scene, map, grid, unlit, Filter::Box, AovSettings::default()).0
 }
 
-/// [`render_window`] with channels beside the light.
+/// [`render_window`] by any filter, with channels beside the light.
+///
+/// A pixel does not depend on the window: filters look at what the map has outside the grid.
 ///
 /// # Panics
 /// If the picture is too large for the machine's memory.
@@ -195,10 +223,11 @@ pub fn render_channels(
     map: &VisibilityMap,
     grid: &PixelGrid,
     unlit: bool,
+    filter: Filter,
     aovs: AovSettings,
 ) -> (Picture, Aovs) {
     let textures = Textures::new(scene, &materials_seen(scene, map));
-    let mut canvas = Canvas::new(grid, aovs);
+    let mut canvas = Canvas::new(grid, filter, aovs);
     canvas.paint_map(scene, &textures, map, grid, unlit, 0);
     (canvas.picture, canvas.aovs)
 }
@@ -207,12 +236,13 @@ pub fn render_channels(
 struct Canvas {
     picture: Picture,
     aovs: Aovs,
+    filter: Filter,
     settings: AovSettings,
 }
 
 impl Canvas {
     /// Nothing yet of a picture of the size of `grid`.
-    fn new(grid: &PixelGrid, settings: AovSettings) -> Self {
+    fn new(grid: &PixelGrid, filter: Filter, settings: AovSettings) -> Self {
         Self {
             picture: Picture {
                 width: grid.width,
@@ -220,6 +250,7 @@ impl Canvas {
                 pixels: vec![[0.0; 4]; grid.pixel_count()],
             },
             aovs: Aovs::new(&settings, grid.pixel_count()),
+            filter,
             settings,
         }
     }
@@ -247,8 +278,20 @@ impl Canvas {
             let BandBuffers { dicer, parts, .. } = buffers;
             dice::dice(map, &bands, band, varies, dicer, parts);
         };
-        let veiled = (!map.veils.is_empty()).then_some(map);
-        self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
+        let kernel = self.filter.kernel();
+        // Channels are those of pixels, and made with the light by area, which a kernel's replaces.
+        if kernel.is_none() || maker.is_some() {
+            let veiled = (!map.veils.is_empty()).then_some(map);
+            self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
+        }
+        if let Some(kernel) = &kernel {
+            let first = first_row * grid.width as usize;
+            let light = &mut self.picture.pixels[first..first + grid.pixel_count()];
+            match kernel.radius() {
+                1 => filtered::paint::<2>(&surfaces, kernel, map, grid, light),
+                _ => filtered::paint::<4>(&surfaces, kernel, map, grid, light),
+            }
+        }
     }
 
     /// What makes the channels beside the light, if there are any.
@@ -378,23 +421,66 @@ fn add(sum: &mut [f64; 4], other: [f64; 4]) {
     }
 }
 
-/// Makes a picture of what multiscan found.
-fn render_spans(
+/// Finds what `camera` sees of `scene` along `n` sub-scanlines of each row of a picture of `width` x
+/// `height` pixels, and what that leaves out.
+///
+/// # Panics
+/// As [`multiscan::find_spans`].
+pub fn find_spans(
+    scene: &Scene,
+    camera: &Camera,
+    [width, height]: [u32; 2],
+    n: u32,
+) -> (SeenSpans, Vec<Shortcoming>) {
+    let faces = visibility::project(scene, camera);
+    let spans = multiscan::find_spans(&faces, width, height, n);
+    let left_out = veils_left_out(&faces);
+    (SeenSpans::of(scene, camera, faces, &spans), left_out)
+}
+
+/// That multiscan leaves veils out, if there are any.
+fn veils_left_out(faces: &Faces) -> Vec<Shortcoming> {
+    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
+    let left_out = (veils > 0).then_some(Shortcoming::VeilsLeftOut(veils));
+    left_out.into_iter().collect()
+}
+
+/// Makes the picture of what multiscan found on any grid of pixels, with channels beside the light.
+///
+/// # Errors
+/// [`TooFewSubScanlines`] where the picture is enlarged too much.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory.
+pub fn render_spans(
+    seen: &SeenSpans,
+    grid: &PixelGrid,
+    unlit: bool,
+    aovs: AovSettings,
+) -> Result<(Picture, Aovs), TooFewSubScanlines> {
+    let (frame, size) = (grid.pixels_per_frame, [grid.width, grid.height]);
+    let spans = seen.spans.on_grid(frame, grid.origin, size)?;
+    let (scene, camera, faces) = (&seen.scene, &seen.camera, &seen.faces);
+    Ok(paint_spans(scene, camera, faces, &spans, grid, unlit, aovs))
+}
+
+/// Makes a picture of spans that lie on the rows of `grid`.
+fn paint_spans(
     scene: &Scene,
     camera: &Camera,
     faces: &Faces,
     spans: &Spans,
-    settings: &RenderSettings,
-) -> Rendered {
+    grid: &PixelGrid,
+    unlit: bool,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
     let shown = spans.faces();
     let materials = shown.iter().map(|&face| material_of(scene, faces, face));
-    let materials: BTreeSet<MaterialId> = materials.collect();
-    let textures = Textures::new(scene, &materials);
-    let (light, unlit) = (Daylight::default(), settings.unlit);
+    let textures = Textures::new(scene, &materials.collect());
+    let light = Daylight::default();
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
-    let grid = PixelGrid::of_frame(spans.width(), spans.height());
-    let mut canvas = Canvas::new(&grid, settings.aovs);
+    let mut canvas = Canvas::new(grid, Filter::Box, aovs);
     let maker = canvas.maker(scene, &textures, camera, faces, &shown);
     let dice = |band: usize, buffers: &mut BandBuffers| {
         let first = band as u32 * BAND_ROWS;
@@ -402,16 +488,8 @@ fn render_spans(
         let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
         dice::dice_spans(spans, rows, fragment_of, dicer, parts);
     };
-    canvas.paint(&surfaces, maker.as_ref(), None, &grid, 0, dice);
-    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
-    Rendered {
-        picture: canvas.picture,
-        aovs: canvas.aovs,
-        shortcomings: (veils > 0)
-            .then_some(Shortcoming::VeilsLeftOut(veils))
-            .into_iter()
-            .collect(),
-    }
+    canvas.paint(&surfaces, maker.as_ref(), None, grid, 0, dice);
+    (canvas.picture, canvas.aovs)
 }
 
 /// Faces of a strip, about, where there are more faces than pixels: enough to keep all cores at
@@ -431,12 +509,18 @@ fn render_strips(
     let height = frame.height as usize;
     let count = strips.clamp(1, height);
     let rows: Vec<usize> = (0..=count).map(|strip| strip * height / count).collect();
-    let border = |&row: &usize| row as f64 / height as f64;
-    let strips = Strips::new(faces, rows.iter().map(border).collect());
+    // Filters look at what lies above and below a strip.
+    let kernel = settings.filter.kernel();
+    let reach = kernel.map_or(0.0, |kernel| f64::from(kernel.radius()) - 0.5);
+    let at = |row: f64| row.clamp(0.0, height as f64) / height as f64;
+    let extents = rows
+        .windows(2)
+        .map(|rows| [at(rows[0] as f64 - reach), at(rows[1] as f64 + reach)]);
+    let strips = Strips::new(faces, extents.collect());
     let in_view = faces.ids().map(|face| material_of(scene, faces, face));
     let textures = Textures::new(scene, &in_view.collect());
 
-    let mut canvas = Canvas::new(&frame, settings.aovs);
+    let mut canvas = Canvas::new(&frame, settings.filter, settings.aovs);
     for strip in 0..count {
         begin(Step::Strip {
             index: strip,
@@ -538,16 +622,30 @@ fn materials_seen(scene: &Scene, map: &VisibilityMap) -> BTreeSet<MaterialId> {
 
 /// What [`render_map`] does not show as it should, in ascending order.
 pub fn shortcomings(scene: &Scene, map: &VisibilityMap) -> Vec<Shortcoming> {
-    let opacities = Opacities::of(scene);
     let opaque = (0..map.opaque.len()).map(|fragment| map.opaque.face(fragment));
-    let drawn_opaque: BTreeSet<MaterialId> = opaque
+    drawn_opaque(scene, &map.faces, opaque)
+}
+
+/// What [`render_spans`] does not show as it should, in ascending order, beside what was left out when
+/// they were found.
+pub fn shortcomings_of_spans(seen: &SeenSpans) -> Vec<Shortcoming> {
+    drawn_opaque(&seen.scene, &seen.faces, seen.faces.ids())
+}
+
+fn drawn_opaque(
+    scene: &Scene,
+    faces: &Faces,
+    shown: impl Iterator<Item = FaceId>,
+) -> Vec<Shortcoming> {
+    let opacities = Opacities::of(scene);
+    let materials: BTreeSet<MaterialId> = shown
         .filter(|&face| {
-            let (object, source) = (map.faces.object(face), map.faces.source(face));
+            let (object, source) = (faces.object(face), faces.source(face));
             opacities.of_face(object, source) != Opacity::Opaque
         })
-        .map(|face| material_of(scene, &map.faces, face))
+        .map(|face| material_of(scene, faces, face))
         .collect();
-    drawn_opaque
+    materials
         .into_iter()
         .map(Shortcoming::DrawnOpaque)
         .collect()
@@ -935,7 +1033,7 @@ mod tests {
     #[test]
     fn a_picture_made_in_strips_is_the_maps() {
         let leaves = crate::scene::generate::by_name("leaves20").expect("a scene");
-        let settings = RenderSettings {
+        let mut settings = RenderSettings {
             width: 120,
             height: 77,
             ..RenderSettings::default()
@@ -944,15 +1042,19 @@ mod tests {
         let faces = visibility::project(scene, camera);
         assert!(faces.len() > 120 * 77, "a crowded picture");
         let map = find_visibility(scene, camera);
-        let expected = render_map(scene, &map, &settings);
-        for strips in [1, 3, 200] {
-            let found = render_strips(scene, camera, &faces, strips, &settings, |_| {});
-            for (a, b) in found.picture.pixels.iter().zip(&expected.pixels) {
-                for (a, b) in a.iter().zip(b) {
-                    assert!((a - b).abs() < 1e-5, "{strips} strips: {a} and {b}");
+        for filter in [Filter::Box, Filter::Triangle, Filter::Mitchell] {
+            settings.filter = filter;
+            let expected = render_map(scene, &map, &settings);
+            for strips in [1, 3, 200] {
+                let found = render_strips(scene, camera, &faces, strips, &settings, |_| {});
+                for (a, b) in found.picture.pixels.iter().zip(&expected.pixels) {
+                    for (a, b) in a.iter().zip(b) {
+                        let wrong = (a - b).abs();
+                        assert!(wrong < 1e-5, "{filter:?}, {strips} strips: {a} and {b}");
+                    }
                 }
+                assert_eq!(found.shortcomings, shortcomings(scene, &map));
             }
-            assert_eq!(found.shortcomings, shortcomings(scene, &map));
         }
         let mut steps = Vec::new();
         render(scene, camera, &settings, |step| steps.push(step));
@@ -988,6 +1090,53 @@ mod tests {
     }
 
     #[test]
+    fn scaled_spans_are_off_by_more_the_fewer_sub_scanlines_are_left() {
+        let made = crate::scene::generate::by_name("balls3").expect("a generated scene");
+        let camera = made.camera.with_aspect(1.5);
+        let map = find_visibility(&made.scene, &camera);
+        let aovs = AovSettings::default();
+        // Root mean square of what the opacity is off by, scaled by `scale` along y.
+        let error_of = |n: u32, scale: f64| {
+            let (seen, _) = find_spans(&made.scene, &camera, [90, 60], n);
+            let mut grid = PixelGrid::of_frame(90, (60.0 * scale).round() as u32);
+            grid.pixels_per_frame.x *= 1.25;
+            grid.origin.x = 10.5;
+            let (found, _) = render_spans(&seen, &grid, true, aovs).expect("is close enough");
+            let exact = render_window(&made.scene, &map, &grid, true);
+            let pairs = found.pixels.iter().zip(&exact.pixels);
+            let squares = pairs.map(|(a, b)| f64::from(a[3] - b[3]).powi(2));
+            (squares.sum::<f64>() / grid.pixel_count() as f64).sqrt()
+        };
+        // With n at equal scale, then with the scale at equal n.
+        for errors in [
+            [64, 16, 4, 1].map(|n| error_of(n, 1.0)),
+            [0.5, 1.0, 2.0, 4.0].map(|scale| error_of(8, scale)),
+        ] {
+            assert!(
+                errors.windows(2).all(|pair| 1.3 * pair[0] < pair[1]),
+                "{errors:?}"
+            );
+            assert!(errors[0] > 0.0, "multiscan is not exact");
+        }
+        // What is not scaled is what was rendered, to the last bit.
+        let (seen, left_out) = find_spans(&made.scene, &camera, [90, 60], 3);
+        assert_eq!(left_out, []);
+        let settings = RenderSettings {
+            sampling: Sampling::Multiscan(3),
+            ..unlit(90, 60)
+        };
+        let expected = render(&made.scene, &camera, &settings, |_| {}).picture;
+        let (found, _) =
+            render_spans(&seen, &PixelGrid::of_frame(90, 60), true, aovs).expect("is as it was");
+        assert!(found == expected);
+        let enlarged = PixelGrid::of_frame(90, 181);
+        let error = render_spans(&seen, &enlarged, true, aovs).expect_err("is too large");
+        assert!(
+            error.to_string().contains("up to 3 times as high"),
+            "{error}"
+        );
+    }
+
     fn a_material_made_transparent_after_its_map_was_found_is_named() {
         let opaque = scene_of(ground(2.0, 2), Material::default());
         let map = flat_map_of(&opaque, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));

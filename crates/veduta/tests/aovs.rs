@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use veduta::accumulate::{AovSettings, Aovs, Matte, Picture, Rank};
 use veduta::dice::{PixelGrid, coverage};
+use veduta::filter::Filter;
 use veduta::geometry::{DMat4, DVec2, DVec3, Vec3};
 use veduta::map::{Camera, MaterialId, Projection, VisibilityMap};
 use veduta::pipeline::{self, RenderSettings, Sampling, find_visibility, render_channels};
@@ -87,7 +88,7 @@ fn a_pixel_tells_of_the_face_that_covers_most_of_it() {
         ..RenderSettings::default()
     };
     let map = find_visibility(&scene, &from_above());
-    let exact = render_channels(&scene, &map, &grid, false, ALL).1;
+    let exact = render_channels(&scene, &map, &grid, false, Filter::Box, ALL).1;
     // In the second row all edges are upright, so that multiscan is exact too.
     let sampling = Sampling::Multiscan(2);
     let multiscan = RenderSettings {
@@ -162,7 +163,15 @@ fn things_of_one_name_are_one_thing() {
     });
     let scene = squares(&[("half", a, [1.0; 3]), ("half", b, [0.5; 3])]);
     let map = find_visibility(&scene, &from_above());
-    let aovs = render_channels(&scene, &map, &PixelGrid::of_frame(1, 1), false, ALL).1;
+    let aovs = render_channels(
+        &scene,
+        &map,
+        &PixelGrid::of_frame(1, 1),
+        false,
+        Filter::Box,
+        ALL,
+    )
+    .1;
     assert_eq!(
         areas(made(&aovs.object_matte), 0),
         BTreeMap::from([(0, 1.0)])
@@ -206,7 +215,7 @@ fn faces_of_pixels(map: &VisibilityMap, grid: &PixelGrid) -> Vec<Vec<(veduta::ma
 fn depth_position_and_normal_are_of_a_largest_face_and_lie_on_it() {
     for (name, scene, camera, grid) in cases() {
         let map = find_visibility(&scene, &camera);
-        let (picture, aovs) = render_channels(&scene, &map, &grid, false, ALL);
+        let (picture, aovs) = render_channels(&scene, &map, &grid, false, Filter::Box, ALL);
         let of_pixels = faces_of_pixels(&map, &grid);
         let mut seen = 0;
         for (pixel, shown) in of_pixels.iter().enumerate() {
@@ -273,7 +282,7 @@ fn mattes_are_the_exact_coverage_and_sum_up_to_opacity() {
     let mut overlapping = 0;
     for (name, scene, camera, grid) in cases() {
         let map = find_visibility(&scene, &camera);
-        let (picture, aovs) = render_channels(&scene, &map, &grid, false, ALL);
+        let (picture, aovs) = render_channels(&scene, &map, &grid, false, Filter::Box, ALL);
         let of_pixels = faces_of_pixels(&map, &grid);
         let matte = made(&aovs.object_matte);
         for (pixel, shown) in of_pixels.iter().enumerate() {
@@ -309,7 +318,7 @@ fn mattes_are_the_exact_coverage_and_sum_up_to_opacity() {
 fn albedo_is_the_picture_without_light() {
     for (name, scene, camera, grid) in cases() {
         let map = find_visibility(&scene, &camera);
-        let aovs = render_channels(&scene, &map, &grid, false, ALL).1;
+        let aovs = render_channels(&scene, &map, &grid, false, Filter::Box, ALL).1;
         let unlit: Picture = pipeline::render_window(&scene, &map, &grid, true);
         for (albedo, &[r, g, b, _]) in made(&aovs.albedo).iter().zip(&unlit.pixels) {
             let off = (Vec3::from(*albedo) - Vec3::new(r, g, b))
@@ -341,7 +350,7 @@ fn strips_and_threads_change_no_channel() {
     let map = find_visibility(&case.scene, &case.camera);
     let grid = PixelGrid::of_frame(settings.width, settings.height);
     assert!(map.faces.len() > grid.pixel_count());
-    let whole = render_channels(&case.scene, &map, &grid, false, ALL).1;
+    let whole = render_channels(&case.scene, &map, &grid, false, Filter::Box, ALL).1;
     let count = grid.pixel_count();
     let same = (0..count).filter(|&pixel| made(&strips.face)[pixel] == made(&whole.face)[pixel]);
     // Where two faces cover about as much, the last digits decide.

@@ -4,6 +4,7 @@ use rng::Rng;
 use veduta::accumulate::{AovSettings, Picture};
 use veduta::composite::composite;
 use veduta::dice::PixelGrid;
+use veduta::filter::Filter;
 use veduta::geometry::{DMat4, DVec2, DVec3, Vec2};
 use veduta::map::{Camera, MaterialId, Projection, SeenScene};
 use veduta::pipeline::{self, RenderSettings};
@@ -270,7 +271,8 @@ fn mattes_share_out_what_is_seen_through_veils() {
         let scene = scene_of(&panes);
         let map = pipeline::find_visibility(&scene, &camera());
         let grid = PixelGrid::of_frame(WIDTH, HEIGHT);
-        let (picture, aovs) = pipeline::render_channels(&scene, &map, &grid, true, settings);
+        let (picture, aovs) =
+            pipeline::render_channels(&scene, &map, &grid, true, Filter::Box, settings);
         let matte = aovs.object_matte.expect("asked for");
         for (pixel, ranks) in picture.pixels.iter().zip(matte.rows.chunks(matte.ranks)) {
             let sum: f32 = ranks.iter().map(|rank| rank.area).sum();

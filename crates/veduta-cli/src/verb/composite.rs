@@ -2,19 +2,16 @@
 
 use super::look::Look;
 use super::output::Output;
-use super::stored::{Changes, open, refuse_place, summary, tell_work};
+use super::stored::{Changes, Stored, open, refuse_place, tell_work};
 use super::{tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
-use crate::values::Names;
 use clap::Args;
 use std::path::PathBuf;
-use veduta::composite::{CompositeError, hold_out};
+use veduta::composite::{CompositeError, composite_spans, hold_out, unite};
 use veduta::dice::PixelGrid;
-use veduta::map::SeenScene;
-use veduta::map::file::Source;
-use veduta::pipeline;
-use veduta_io::{Layers, write_map};
+use veduta::map::{Casters, Choice, Origin, SeenScene};
+use veduta_io::{Layers, ObjectNames, choose_objects};
 
 /// Put stored maps together by depth
 ///
@@ -34,11 +31,11 @@ pub struct Composite {
     /// Take only the objects of these names from the maps; names match with *, ** and ?. May be given
     /// several times
     #[arg(long, value_name = "NAME")]
-    only: Vec<Names>,
+    only: Vec<ObjectNames>,
     /// Leave out the objects of these names: where they were seen, nothing of their map is. May be given
     /// several times
     #[arg(long, value_name = "NAME")]
-    without: Vec<Names>,
+    without: Vec<ObjectNames>,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -76,52 +73,64 @@ impl Composite {
             let message = "a map is of no picture: --aov is not for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
+        if map_place.is_some() {
+            self.look.refuse_filter("a map is of no picture")?;
+        }
         if map_place.is_none() && target.is_none() {
             let message = "a composite is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         }
-        let mut maps: Vec<SeenScene> = Vec::new();
-        let mut sources: Vec<Source> = Vec::new();
+        let mut maps: Vec<Stored> = Vec::new();
+        let mut origins: Vec<Origin> = Vec::new();
         talk.begin("reading");
         for (index, path) in self.maps.iter().chain(&self.holdout).enumerate() {
             talk.part(index, self.maps.len() + self.holdout.len());
             let mut map = open(path)?;
-            for source in map.reader().sources() {
-                if !sources.contains(source) {
-                    sources.push(source.clone());
-                }
+            if map_place.is_some() {
+                origins.push(map.origin()?);
             }
-            maps.push(map.read(|reader| reader.read())?);
+            maps.push(Stored::read(&mut map)?);
         }
-        self.select(&mut maps)?;
+        let count = maps.len();
         talk.begin("compositing");
-        let (shown, holdouts) = maps.split_at(self.maps.len());
-        let mut seen = hold_out(shown, holdouts).map_err(|error| self.refusal(&error))?;
-        self.changes.apply(&mut seen.scene, self.strict, talk)?;
+        let mut seen = self.composite(maps)?;
+        self.changes.apply(seen.scene_mut(), self.strict, talk)?;
         let mut told = serde_json::json!({
-            "size": seen.size,
-            "maps": maps.len(),
-            "facesSeen": seen.map.faces.len(),
+            "size": seen.size(),
+            "maps": count,
+            "facesSeen": seen.faces().len(),
         });
         if let Some(place) = map_place {
             talk.begin("writing");
-            write_map(place, &seen, &sources)?;
+            let origin = self.origin(origins, talk)?;
+            seen.write(place, &origin)?;
             told["output"] = place.to_string_lossy().into();
         }
         if let Some(target) = &target {
-            let [width, height] = seen.size;
-            let development = self.look.development(&seen.scene, self.strict, talk)?;
-            let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
-            tell_shortcomings(&self.maps[0], &seen.scene, &shortcomings, self.strict, talk)?;
+            let [width, height] = seen.size();
+            let development = self.look.development(seen.scene(), self.strict, talk)?;
+            let shortcomings = seen.shortcomings();
+            tell_shortcomings(
+                &self.maps[0],
+                seen.scene(),
+                &shortcomings,
+                self.strict,
+                talk,
+            )?;
             talk.begin("shading");
             let grid = PixelGrid::of_frame(width, height);
-            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
-            let (mut picture, aovs) =
-                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+            let (aovs, filter) = (self.output.aovs(), self.look.filter());
+            if matches!(seen, Stored::Spans(_)) {
+                self.look
+                    .refuse_filter("filters weigh exact regions, not spans")?;
+            }
+            let (mut picture, aovs) = seen
+                .picture(&grid, self.look.unlit, filter, aovs)
+                .expect("a picture in its own size needs no more sub-scanlines");
             let layers = Layers {
                 aovs: &aovs,
-                scene: &seen.scene,
-                camera: &seen.map.camera,
+                scene: seen.scene(),
+                camera: seen.camera(),
                 grid,
             };
             tell_of_mattes(&self.maps[0], &layers, self.strict, talk)?;
@@ -132,13 +141,89 @@ impl Composite {
             told["output"] = target.name().into();
         }
         talk.end();
-        talk.detail(format_args!("{}", summary(&seen)));
+        talk.detail(format_args!("{}", seen.summary()));
         if json {
             told["warnings"] = talk.warnings().into();
             tell_work(&mut told);
             print(&format!("{told}\n"))?;
         }
         Ok(())
+    }
+
+    /// Makes one of all: of regions, or of spans.
+    fn composite(&self, maps: Vec<Stored>) -> Result<Stored, Failure> {
+        let (mut regions, mut spans) = (Vec::new(), Vec::new());
+        for map in maps {
+            match map {
+                Stored::Regions(seen) => regions.push(seen),
+                Stored::Spans(seen) => spans.push(seen),
+            }
+        }
+        if spans.is_empty() {
+            self.select(&mut regions)?;
+            let (shown, holdouts) = regions.split_at(self.maps.len());
+            let seen = hold_out(shown, holdouts).map_err(|error| self.refusal(&error))?;
+            return Ok(Stored::Regions(seen));
+        }
+        let usage = |message: &str| Err(Failure::new(Code::Usage, message));
+        if !regions.is_empty() {
+            return usage(
+                "some of the maps hold regions and others spans on sub-scanlines; make all of them \
+                 with the same --sampling",
+            );
+        }
+        if !(self.holdout.is_empty() && self.only.is_empty() && self.without.is_empty()) {
+            return usage("--holdout, --only and --without are for maps of regions, not of spans");
+        }
+        let seen = composite_spans(&spans).map_err(|error| self.refusal(&error))?;
+        Ok(Stored::Spans(seen))
+    }
+
+    /// What the composite is made of. What only hides casts no shadow on what is shown.
+    fn origin(&self, origins: Vec<Origin>, talk: &mut Talk) -> Result<Origin, Failure> {
+        let sources = origins.iter().flat_map(|origin| origin.sources.clone());
+        let sources = sources.collect();
+        let mut embedded = Vec::new();
+        let mut readings = Vec::new();
+        for (origin, path) in origins.into_iter().zip(&self.maps) {
+            let Some(casters) = origin.casters else {
+                talk.warn(format!(
+                    "{}: does not tell what casts shadows, so that the composite does not either;                      make the map again",
+                    path.display()
+                ));
+                let casters = None;
+                return Ok(Origin { sources, casters });
+            };
+            embedded.extend(casters.embedded);
+            readings.extend(casters.readings);
+        }
+        let text = |names: &[ObjectNames]| -> Vec<String> {
+            names.iter().map(|names| names.text().to_owned()).collect()
+        };
+        let choice = Choice {
+            only: text(&self.only),
+            without: text(&self.without),
+        };
+        if choice != Choice::default() {
+            for scene in &mut embedded {
+                let chosen = choose_objects(scene, &choice);
+                chosen.map_err(|problem| Failure::new(Code::Usage, problem))?;
+            }
+            for reading in &mut readings {
+                reading.choices.push(choice.clone());
+            }
+        }
+        let mut embedded = match embedded.len() {
+            0 | 1 => embedded.pop(),
+            _ => Some(unite(&embedded.iter().collect::<Vec<_>>())),
+        };
+        if let Some(scene) = &mut embedded {
+            self.changes.apply_to_casters(scene)?;
+        }
+        Ok(Origin {
+            sources,
+            casters: Some(Casters { embedded, readings }),
+        })
     }
 
     /// Leaves the objects asked for in the maps; a name that no object has is an error.
@@ -155,7 +240,8 @@ impl Composite {
         if self.only.is_empty() && self.without.is_empty() {
             return Ok(());
         }
-        let is_of = |list: &[Names], name: &str| list.iter().any(|names| names.match_name(name));
+        let is_of =
+            |list: &[ObjectNames], name: &str| list.iter().any(|names| names.match_name(name));
         for seen in maps.iter_mut().take(self.maps.len()) {
             *seen = seen.selected(|name| {
                 (self.only.is_empty() || is_of(&self.only, name)) && !is_of(&self.without, name)
@@ -168,7 +254,8 @@ impl Composite {
     fn refusal(&self, error: &CompositeError) -> Failure {
         let message = match error {
             CompositeError::OtherCamera { index, difference }
-            | CompositeError::OtherWorld { index, difference } => format!(
+            | CompositeError::OtherWorld { index, difference }
+            | CompositeError::OtherSampling { index, difference } => format!(
                 "{}: cannot be composited with {}: {difference}",
                 self.maps
                     .iter()

@@ -13,8 +13,7 @@ use cpu_time::ProcessTime;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use veduta::dice::PixelGrid;
-use veduta::map::Camera;
-use veduta::map::file::Source;
+use veduta::map::{Camera, Origin};
 use veduta::pipeline::{self, Extent, FrameStep, FrameWork};
 use veduta_io::{
     Layers, Loaded, Moment, ReadOptions, SceneOverTime, VectorFormat, is_map, source_of, write_map,
@@ -80,7 +79,8 @@ struct Run<'a> {
     /// In EV, once it is known.
     exposure: Option<f32>,
     frames: pipeline::Frames,
-    source: Option<Source>,
+    /// Whether frames are stored maps.
+    makes_maps: bool,
     names: FrameNames<'a>,
 }
 
@@ -208,6 +208,9 @@ impl Frames {
             return Err(Failure::new(Code::Usage, message));
         }
         let makes_maps = is_map(names.pattern);
+        if makes_maps {
+            self.look.refuse_filter("a map is of no picture")?;
+        }
         if makes_maps && self.output.has_layers() {
             let message = "a map is of no picture: --aov is not for .veduta";
             return Err(Failure::new(Code::Usage, message));
@@ -233,7 +236,7 @@ impl Frames {
             exposes_itself,
             exposure: None,
             frames: pipeline::Frames::new([size.width, size.height]),
-            source: makes_maps.then(|| source_of(&self.model)).transpose()?,
+            makes_maps,
             names,
         })
     }
@@ -283,13 +286,19 @@ impl Frames {
             }
             step = next;
         };
+        let files = loaded.files;
         let (seen, work) = run.frames.next(loaded.scene, &camera, |next| {
             end_step(&mut times, Some(next));
         });
         end_step(&mut times, None);
         let path = run.names.path(number);
-        if let Some(source) = &run.source {
-            write_map(&path, seen, std::slice::from_ref(source))?;
+        if run.makes_maps {
+            let origin = Origin {
+                sources: files,
+                // A reading of the files tells of no moment.
+                casters: None,
+            };
+            write_map(&path, seen, &origin)?;
             times.writing = lap();
         }
         if let Some(development) = &run.development {
@@ -297,9 +306,9 @@ impl Frames {
             let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
             tell_shortcomings(&self.model, &seen.scene, &shortcomings, self.strict, talk)?;
             let grid = PixelGrid::of_frame(run.size.width, run.size.height);
-            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
+            let (aovs, unlit, filter) = (self.output.aovs(), self.look.unlit, self.look.filter());
             let (mut picture, aovs) =
-                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
+                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, filter, aovs);
             match run.exposure {
                 Some(ev) => development.develop_at(&mut picture, ev, !target.linear),
                 None => run.exposure = Some(development.develop(&mut picture, !target.linear)),

@@ -1,10 +1,11 @@
-//! How light becomes colour: exposure, tone, background.
+//! How light becomes colour: filter, exposure, tone, background.
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use crate::values::{self, Background};
 use clap::{Args, ValueEnum};
 use veduta::accumulate::Picture;
+use veduta::filter::Filter;
 use veduta::scene::Scene;
 use veduta_io::read_picture;
 use veduta_io::tone::{self, Exposure, Tone};
@@ -16,6 +17,14 @@ pub struct Look {
     /// Show the colours of materials as they are, without light
     #[arg(long)]
     pub unlit: bool,
+    /// How what is seen around a pixel's centre is weighed. All but box reach into the neighbours
+    ///
+    /// Weights are exact, as areas are: no samples. Deep pictures and the channels of --aov keep the areas of
+    /// pixels. mitchell and catmull-rom have lobes below 0: beside edges, colours may be a little below 0 and
+    /// opacities above 1. Linear formats keep that, others cut it off. Beyond the frame nothing is known: at
+    /// its border, a pixel is the mean of what its filter reaches inside.
+    #[arg(long, value_name = "NAME", default_value = "box")]
+    filter: FilterArgument,
     /// none, a colour such as #8ab4d8, or a picture, which is scaled to the frame
     #[arg(long, value_name = "COLOUR|FILE", default_value = "none")]
     background: Background,
@@ -33,6 +42,22 @@ enum ToneArgument {
     None,
     /// Leave middle tones, roll off highlights above 0.6 (the shoulder of Reinhard et al. 2002)
     Filmic,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FilterArgument {
+    /// Exact area in the pixel
+    Box,
+    /// 1 at the centre, 0 at the next one
+    Triangle,
+    /// Soft: standard deviation half a pixel, ends at two
+    Gaussian,
+    /// The compromise of Mitchell & Netravali (1988): reaches two pixels, a little ringing
+    Mitchell,
+    /// The sharpest: reaches two pixels, more ringing
+    CatmullRom,
+    /// The softest: reaches two pixels
+    BSpline,
 }
 
 /// What pictures are laid on.
@@ -53,6 +78,27 @@ pub struct Development {
 }
 
 impl Look {
+    /// How pixels are weighed.
+    pub fn filter(&self) -> Filter {
+        match self.filter {
+            FilterArgument::Box => Filter::Box,
+            FilterArgument::Triangle => Filter::Triangle,
+            FilterArgument::Gaussian => Filter::Gaussian,
+            FilterArgument::Mitchell => Filter::Mitchell,
+            FilterArgument::CatmullRom => Filter::CatmullRom,
+            FilterArgument::BSpline => Filter::BSpline,
+        }
+    }
+
+    /// Fails if a filter is asked for that has no meaning for what is made, and tells why.
+    pub fn refuse_filter(&self, why: &str) -> Result<(), Failure> {
+        if self.filter == FilterArgument::Box {
+            return Ok(());
+        }
+        let message = format!("{why}; leave --filter out");
+        Err(Failure::new(Code::Usage, message))
+    }
+
     /// Reads what the look needs, before the work rather than after it.
     pub fn development(
         &self,

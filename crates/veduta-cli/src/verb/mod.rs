@@ -102,6 +102,11 @@ pub struct When {
 }
 
 impl When {
+    /// Whether another moment than that at rest is asked for.
+    fn is_asked_for(&self) -> bool {
+        self.frame.is_some() || self.time.is_some() || self.animation.is_some()
+    }
+
     fn options(&self, reading: &Reading) -> ReadOptions {
         let moment = match (self.frame, self.time) {
             (Some(frame), _) => Moment::Frame(frame),

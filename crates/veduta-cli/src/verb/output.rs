@@ -41,9 +41,9 @@ pub struct Output {
     /// Write further channels into an .exr, separated by commas
     ///
     /// Depth, normal, position and numbers are those of the face that covers most of the pixel, at the
-    /// centroid of what is seen of it, and not filtered; albedo and Cryptomatte are exact areas. Where
-    /// nothing is seen, depth is 1e10 and all else 0. The camera is told by worldToCamera and
-    /// worldToNDC.
+    /// centroid of what is seen of it, and not filtered; albedo and Cryptomatte are exact areas,
+    /// whatever the --filter. Where nothing is seen, depth is 1e10 and all else 0. The camera is told
+    /// by worldToCamera and worldToNDC.
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "output")]
     aov: Vec<AovArgument>,
     /// How many names a Cryptomatte can tell of a pixel, rounded up to an even number; 6 by default

@@ -1,10 +1,12 @@
 //! The verbs, pictures and pipes as users meet them.
 
+mod casters;
 mod check;
 mod deep;
 mod diff;
 mod endings;
 mod examples;
+mod filters;
 mod frames;
 mod help;
 mod info;
@@ -12,6 +14,7 @@ mod pictures;
 mod pipes;
 mod preview;
 mod readme;
+mod spans;
 mod stored;
 
 use assert_cmd::Command;

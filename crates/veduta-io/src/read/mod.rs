@@ -61,6 +61,7 @@ use over_time::Models;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use veduta::map::Source;
 use veduta::scene::Scene;
 
 /// The axis of a file that points upwards.
@@ -97,6 +98,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// What a user should know.
     pub warnings: Vec<Warning>,
+    /// The files that it was read from, each once; the first is the one that was named.
+    pub files: Vec<Source>,
     /// Name of the camera that a scene file means to be used where none is asked for.
     pub default_camera: Option<String>,
     /// Widths and heights in pixels that cameras of a scene file mean their pictures to have, by the
@@ -168,16 +171,17 @@ fn read_with(path: &Path, options: &ReadOptions, models: &mut Models) -> Result<
 /// Reads a scene from a file that is no scene file.
 fn read_model(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut warnings = Warnings::new(path.to_owned());
+    let mut budget = Budget::new();
     let mut animations = Vec::new();
-    let scene = read(path, options, &mut animations, &mut warnings);
-    let scene = scene.map_err(|fault| fault.of(path))?;
+    let scene = read(path, options, &mut animations, &mut budget, &mut warnings);
     if animations.is_empty() && options.moment != Moment::Rest {
         let message = "has no animations, and stands at rest at any time";
         warnings.add(Place::Whole, message);
     }
     Ok(Loaded {
-        scene,
+        scene: scene.map_err(|fault| fault.of(path))?,
         warnings: warnings.finish(),
+        files: budget.files.finish(),
         default_camera: None,
         picture_sizes: Vec::new(),
         animations,
@@ -252,6 +256,7 @@ fn read(
     path: &Path,
     options: &ReadOptions,
     animations: &mut Vec<Animation>,
+    budget: &mut Budget,
     warnings: &mut Warnings,
 ) -> Result<Scene, Fault> {
     let whole = |problem: Problem| problem.at(Place::Whole);
@@ -261,7 +266,7 @@ fn read(
         return Err(whole(Problem::UnknownFormat { known }));
     };
     let bytes = std::fs::read(path).map_err(|error| whole(Problem::Unreadable(error)))?;
-    let mut budget = Budget::new();
+    budget.files.add(path, &bytes);
     budget.add_input(bytes.len());
     let mut scene = match format {
         #[cfg(feature = "gltf")]
@@ -272,18 +277,18 @@ fn read(
                 seconds,
                 repeats: options.repeats,
             });
-            gltf::read(path, &bytes, played, animations, &mut budget, warnings)?
+            gltf::read(path, &bytes, played, animations, budget, warnings)?
         }
         #[cfg(feature = "obj")]
-        Format::Obj => obj::read(path, &bytes, &mut budget, warnings)?,
+        Format::Obj => obj::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "ply")]
-        Format::Ply => ply::read(path, &bytes, &mut budget, warnings)?,
+        Format::Ply => ply::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "stl")]
-        Format::Stl => stl::read(path, &bytes, &mut budget, warnings)?,
+        Format::Stl => stl::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "cityjson")]
         Format::CityJson => {
             let level = options.level_of_detail;
-            cityjson::read(path, &bytes, level, &mut budget, warnings)?
+            cityjson::read(path, &bytes, level, budget, warnings)?
         }
     };
     let up = options.up_axis.unwrap_or_else(|| format.usual_up());

@@ -21,7 +21,7 @@ pub fn rgba16(pixels: &[[f32; 4]]) -> Vec<u16> {
 #[cfg(feature = "jpeg")]
 pub fn rgb8_on_white(pixels: &[[f32; 4]]) -> Vec<u8> {
     let coded = |&[r, g, b, alpha]: &[f32; 4]| {
-        let white = (1.0 - alpha).max(0.0);
+        let white = 1.0 - alpha;
         [r, g, b].map(|light| round(srgb_from_linear((light + white).clamp(0.0, 1.0)), 255.0) as u8)
     };
     pixels.par_iter().flat_map_iter(coded).collect()

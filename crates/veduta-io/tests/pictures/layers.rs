@@ -5,6 +5,7 @@ use exr::prelude::{AttributeValue, FlatSamples, ReadChannels, ReadLayers};
 use std::collections::BTreeMap;
 use veduta::accumulate::{AovSettings, Aovs, Picture};
 use veduta::dice::{PixelGrid, coverage};
+use veduta::filter::Filter;
 use veduta::geometry::{DMat4, DVec3};
 use veduta::map::{Camera, MaterialId, Projection, VisibilityMap};
 use veduta::pipeline::{find_visibility, render_channels};
@@ -94,7 +95,7 @@ fn made(ranks: usize) -> Made {
         material_ranks: ranks,
     };
     let grid = PixelGrid::of_frame(SIZE.0, SIZE.1);
-    let (picture, aovs) = render_channels(&scene, &map, &grid, false, settings);
+    let (picture, aovs) = render_channels(&scene, &map, &grid, false, Filter::Box, settings);
     Made {
         scene,
         map,

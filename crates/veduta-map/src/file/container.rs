@@ -329,14 +329,27 @@ impl<R: Read + Seek> ArchiveReader<R> {
             checksum.update(&self.bytes("a member", at, length)?);
             at += length;
         }
-        if checksum.finalize() == member.crc32 {
-            Ok(())
-        } else {
-            Err(FileError::Damaged {
-                what: member.name.clone(),
-                offset: member.start(),
-            })
-        }
+        same_checksum(checksum, member)
+    }
+
+    /// All bytes of a member, which are those that were written.
+    pub fn checked_bytes(&mut self, member: &Member) -> Result<Vec<u8>, FileError> {
+        let bytes = self.bytes("a member", member.start(), member.length)?;
+        let mut checksum = crc32fast::Hasher::new();
+        checksum.update(&bytes);
+        same_checksum(checksum, member)?;
+        Ok(bytes)
+    }
+}
+
+fn same_checksum(checksum: crc32fast::Hasher, member: &Member) -> Result<(), FileError> {
+    if checksum.finalize() == member.crc32 {
+        Ok(())
+    } else {
+        Err(FileError::Damaged {
+            what: member.name.clone(),
+            offset: member.start(),
+        })
     }
 }
 

@@ -3,15 +3,13 @@
 use crate::{FaceId, Fragment, Fragments, VisibilityMap};
 use veduta_geometry::DVec2;
 
-/// Faces of a tile: more would make a window read much beyond its border, fewer would compress worse.
-const FACES_PER_TILE: usize = 1024;
+/// Faces of a tile at most: more would make a window read much beyond its border, fewer would compress
+/// worse.
+const FACES_PER_TILE: usize = 768;
 
-/// Powers of two of the size of faces that are kept apart: large faces would make the box around their
-/// tile as large, and small ones beside them be read in vain.
-const SIZE_CLASS: u32 = 3;
-
-/// Size classes; faces smaller than the last are in it.
-const SIZE_CLASSES: u32 = 5;
+/// Side of the windows, as a share of the frame's, that tiles are cut for. A larger one would leave tiles
+/// long, a smaller one would cut large faces apart from small ones at any price.
+const WINDOW: f64 = 0.125;
 
 /// Faces that are stored together, with all that is seen of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,22 +44,11 @@ impl Box2 {
         }
     }
 
-    /// Where along the order of storage: by size, then along a Z-shaped curve of their middles.
-    fn place(&self) -> (u32, u32) {
-        let size = (self.max - self.min).max_element().max(f64::MIN_POSITIVE);
-        let class = (-size.log2() / f64::from(SIZE_CLASS)).clamp(0.0, f64::from(SIZE_CLASSES - 1));
-        let middle = (0.5 * (self.min + self.max)).clamp(DVec2::ZERO, DVec2::splat(1.0));
-        let cell = (middle * 65535.0).as_uvec2();
-        (class as u32, interleaved(cell.x) | interleaved(cell.y) << 1)
+    /// How likely a window somewhere in the frame is to touch it, but for a factor.
+    fn exposure(&self) -> f64 {
+        let sides = self.max - self.min + WINDOW;
+        sides.x * sides.y
     }
-}
-
-/// The lower 16 bits with a zero before each.
-fn interleaved(mut bits: u32) -> u32 {
-    bits = (bits | bits << 8) & 0x00ff_00ff;
-    bits = (bits | bits << 4) & 0x0f0f_0f0f;
-    bits = (bits | bits << 2) & 0x3333_3333;
-    (bits | bits << 1) & 0x5555_5555
 }
 
 /// Shares the faces of a map out among tiles.
@@ -73,34 +60,26 @@ pub fn tiles(map: &VisibilityMap) -> Vec<Tile> {
         }
     }
     // A face without a fragment is only named along sides, and stored where it is named.
-    let mut order: Vec<((u32, u32), FaceId)> = map
+    let mut shown: Vec<FaceId> = map
         .faces
         .ids()
         .filter(|face| boxes[face.index()].min.is_finite())
-        .map(|face| (boxes[face.index()].place(), face))
         .collect();
-    order.sort_unstable();
-
-    let of_one_class = order.chunk_by(|a, b| a.0.0 == b.0.0);
-    let chunks = of_one_class.flat_map(|faces| faces.chunks(FACES_PER_TILE));
     let mut tiles = Vec::new();
     let mut tile_of = vec![u32::MAX; map.faces.len()];
-    for chunk in chunks {
-        let mut bounds = Box2::EMPTY;
-        let mut faces: Vec<FaceId> = chunk.iter().map(|&(_, face)| face).collect();
-        faces.sort_unstable();
-        for face in &faces {
-            let of_face = boxes[face.index()];
-            bounds.add(&[of_face.min, of_face.max]);
+    share_out(&mut shown, &boxes, &mut |faces| {
+        let bounds = around(faces, &boxes);
+        for face in &*faces {
             tile_of[face.index()] = tiles.len() as u32;
         }
+        faces.sort_unstable();
         tiles.push(Tile {
             bounds: [bounds.min.x, bounds.min.y, bounds.max.x, bounds.max.y],
-            faces,
+            faces: faces.to_vec(),
             opaque: Vec::new(),
             veils: Vec::new(),
         });
-    }
+    });
     for index in 0..map.opaque.len() {
         tiles[tile_of[map.opaque.face(index).index()] as usize]
             .opaque
@@ -112,6 +91,61 @@ pub fn tiles(map: &VisibilityMap) -> Vec<Tile> {
             .push(index as u32);
     }
     tiles
+}
+
+/// Calls `take` with the faces of each tile.
+///
+/// Faces are parted in two, and each part again, until few enough are left: by where their middles lie
+/// along x or along y, or the largest from the others, whichever makes windows read least. (In the order
+/// of a curve through the frame, cut into equal lengths, tiles are large where a piece crosses from one
+/// quarter to another: on a terrain, windows read twice as much.)
+fn share_out(faces: &mut [FaceId], boxes: &[Box2], take: &mut impl FnMut(&mut [FaceId])) {
+    if faces.len() <= FACES_PER_TILE {
+        if !faces.is_empty() {
+            take(faces);
+        }
+        return;
+    }
+    let of = |face: FaceId| &boxes[face.index()];
+    let x = |face: FaceId| of(face).min.x + of(face).max.x;
+    let y = |face: FaceId| of(face).min.y + of(face).max.y;
+    let smallness = |face: FaceId| -(of(face).max - of(face).min).max_element();
+    let half = faces.len() / 2;
+    let ways: [(&dyn Fn(FaceId) -> f64, usize); 4] = [
+        (&x, half),
+        (&y, half),
+        (&smallness, half),
+        (&smallness, FACES_PER_TILE),
+    ];
+    let part = |faces: &mut [FaceId], (key, first): (&dyn Fn(FaceId) -> f64, usize)| {
+        faces.select_nth_unstable_by(first, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
+    };
+    let mut parted = faces.to_vec();
+    let mut bytes_read = |way: (&dyn Fn(FaceId) -> f64, usize)| {
+        part(&mut parted, way);
+        let (first, second) = parted.split_at(way.1);
+        let read = |faces: &[FaceId]| faces.len() as f64 * around(faces, boxes).exposure();
+        read(first) + read(second)
+    };
+    let costs = ways.map(|way| bytes_read(way));
+    let best = (0..ways.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
+    let way = ways[best.expect("there are some")];
+    drop(parted);
+    part(faces, way);
+    let first = way.1;
+    let (first, second) = faces.split_at_mut(first);
+    share_out(first, boxes, take);
+    share_out(second, boxes, take);
+}
+
+/// The box around what is seen of some faces.
+fn around(faces: &[FaceId], boxes: &[Box2]) -> Box2 {
+    let mut all = Box2::EMPTY;
+    for face in faces {
+        let Box2 { min, max } = boxes[face.index()];
+        all.add(&[min, max]);
+    }
+    all
 }
 
 impl Tile {

@@ -1,5 +1,5 @@
 use crate::ObjectId;
-use crate::scene::Scene;
+use crate::scene::{Object, Scene};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use veduta_geometry::DVec3;
@@ -50,16 +50,20 @@ impl Scene {
         for layer in self.layers.iter().filter(|layer| !keep(layer)) {
             kept[layer.objects.start as usize..layer.objects.end as usize].fill(false);
         }
+        self.keep_rows(&kept);
         self.layers.retain(&keep);
-        self.keep_objects(|object| kept[object.index()]);
     }
 
-    /// Leaves out all objects but those that `keep` accepts. Layers stay, if need be without objects.
-    ///
-    /// Meshes, materials, cameras and lights stay as they are.
-    pub fn keep_objects(&mut self, keep: impl Fn(ObjectId) -> bool) {
-        let kept = (0..self.objects.len()).map(|index| keep(ObjectId::from_index(index)));
-        let kept: Vec<bool> = kept.collect();
+    /// Leaves out all objects but those that `keep` accepts. All else stays as it is, layers without
+    /// objects too.
+    pub fn keep_objects(&mut self, keep: impl Fn(&Object) -> bool) {
+        let kept: Vec<bool> = self.objects.iter().map(keep).collect();
+        self.keep_rows(&kept);
+    }
+
+    /// Leaves out all objects but those whose row is `kept`. All else stays as it is, layers without
+    /// objects too.
+    pub fn keep_rows(&mut self, kept: &[bool]) {
         // How many stay before each object.
         let mut before = vec![0; kept.len() + 1];
         for (index, &is_kept) in kept.iter().enumerate() {
@@ -69,15 +73,16 @@ impl Scene {
             let moved = |end: u32| before[end as usize];
             layer.objects = moved(layer.objects.start)..moved(layer.objects.end);
         }
-        let mut kept = kept.into_iter();
-        self.objects.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = kept.iter();
+        self.objects
+            .retain(|_| kept.next().copied().unwrap_or(true));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{MeshId, Object};
+    use crate::scene::MeshId;
     use veduta_geometry::DMat4;
 
     #[test]

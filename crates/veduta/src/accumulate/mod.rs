@@ -1,7 +1,7 @@
 //! Parts and their radiance -> pixels.
 //!
 //! The box filter: a pixel is the sum over its parts of area times radiance. It is exact wherever
-//! radiance is constant over a part.
+//! radiance is constant over a part. [`KernelFilter`] does the same with kernels that reach farther.
 //!
 //! [`DeepFilter`] keeps of each face in a pixel a sample of its own, with its depth. Beside the light,
 //! what a picture tells of its pixels otherwise ([`Aovs`]), of which the areas of things ([`rank`]) are
@@ -9,10 +9,12 @@
 
 mod aovs;
 mod deep;
+mod kernel_filter;
 mod matte;
 
 pub use aovs::{AovSettings, Aovs};
 pub use deep::{DeepFilter, DeepRows, DeepSample};
+pub use kernel_filter::{KernelFilter, KernelSums};
 pub use matte::{Matte, Rank, rank};
 
 use crate::dice::Parts;
@@ -46,6 +48,14 @@ pub fn box_filter(
         let value = [r, g, b, 1.0].map(|channel| area * f64::from(channel));
         add(&mut sums[part.pixel as usize], value);
     }
+    add_runs(parts, radiance, sums);
+    for (pixel, sum) in pixels.iter_mut().zip(sums) {
+        *pixel = sum.map(|channel| channel as f32);
+    }
+}
+
+/// Adds to each pixel what fills it.
+fn add_runs(parts: &Parts, radiance: &Radiance, sums: &mut [[f64; 4]]) {
     for (index, run) in parts.runs.iter().enumerate() {
         let sums = &mut sums[run.pixels()];
         match radiance.of_run(index) {
@@ -59,9 +69,6 @@ pub fn box_filter(
                 }
             }
         }
-    }
-    for (pixel, sum) in pixels.iter_mut().zip(sums) {
-        *pixel = sum.map(|channel| channel as f32);
     }
 }
 

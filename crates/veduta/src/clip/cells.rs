@@ -24,6 +24,8 @@ pub(crate) struct CellLists {
     top: Vec<f32>,
     bottom: Vec<f32>,
     nearest: Vec<f32>,
+    /// The map that the face is of, a number that is exact in single precision; empty where all are of one.
+    map: Vec<f32>,
     /// Whether a face was guessed to be hidden in the cell.
     guessed: Vec<bool>,
 }
@@ -74,8 +76,14 @@ pub(crate) fn listed_between(
     (faces, lists)
 }
 
-/// The faces that `wanted` accepts, in all cells that they touch.
-pub(crate) fn listed(context: &Context, wanted: impl Fn(FaceId) -> bool + Sync) -> CellLists {
+/// The faces that `wanted` accepts, in the cells that they touch and `meets` tells of; `map` is the map
+/// that each is of.
+pub(crate) fn listed_of_maps(
+    context: &Context,
+    wanted: impl Fn(FaceId) -> bool + Sync,
+    meets: &[bool],
+    map: impl Fn(FaceId) -> u32 + Sync,
+) -> CellLists {
     let Context {
         faces,
         extents,
@@ -93,8 +101,9 @@ pub(crate) fn listed(context: &Context, wanted: impl Fn(FaceId) -> bool + Sync) 
                     continue;
                 }
                 grid.each_row(faces.outline(face), extent, |row, columns| {
-                    let cells = columns.map(|column| grid.index(column, row) as u32);
-                    chunk.listed.extend(cells.map(|cell| (cell, face.0)));
+                    let cells = columns.map(|column| grid.index(column, row));
+                    let cells = cells.filter(|&cell| meets[cell]);
+                    chunk.listed.extend(cells.map(|cell| (cell as u32, face.0)));
                     true
                 });
             }
@@ -102,7 +111,9 @@ pub(crate) fn listed(context: &Context, wanted: impl Fn(FaceId) -> bool + Sync) 
         })
         .collect();
     let cells = grid.cells();
-    CellLists::gather(cells, &chunks, extents, vec![false; cells])
+    let mut lists = CellLists::gather(cells, &chunks, extents, vec![false; cells]);
+    lists.map = lists.column(|face| map(FaceId(face)) as f32);
+    lists
 }
 
 /// What one task lists.
@@ -187,26 +198,37 @@ impl CellLists {
             face[*place as usize] = id;
             *place += 1;
         }
-        // Padded, so that the last cell too can be read LANES at a time.
-        let column = |bound: fn(&Extent) -> f32| -> Vec<f32> {
-            let mut column: Vec<f32> = Vec::with_capacity(entries + LANES);
-            face.par_iter()
-                .with_min_len(16 * 1024)
-                .map(|&id| bound(&extents[id as usize]))
-                .collect_into_vec(&mut column);
-            column.resize(entries + LANES, 0.0);
-            column
-        };
-        Self {
-            left: column(|extent| extent.x[0]),
-            right: column(|extent| extent.x[1]),
-            top: column(|extent| extent.y[0]),
-            bottom: column(|extent| extent.y[1]),
-            nearest: column(|extent| extent.nearness[1]),
+        let mut lists = Self {
             start,
             face,
             guessed,
-        }
+            left: Vec::new(),
+            right: Vec::new(),
+            top: Vec::new(),
+            bottom: Vec::new(),
+            nearest: Vec::new(),
+            map: Vec::new(),
+        };
+        let extent = |face: u32| &extents[face as usize];
+        lists.left = lists.column(|face| extent(face).x[0]);
+        lists.right = lists.column(|face| extent(face).x[1]);
+        lists.top = lists.column(|face| extent(face).y[0]);
+        lists.bottom = lists.column(|face| extent(face).y[1]);
+        lists.nearest = lists.column(|face| extent(face).nearness[1]);
+        lists
+    }
+
+    /// A column; padded, so that the last cell too can be read LANES at a time.
+    fn column(&self, value: impl Fn(u32) -> f32 + Sync) -> Vec<f32> {
+        let entries = self.face.len();
+        let mut column: Vec<f32> = Vec::with_capacity(entries + LANES);
+        self.face
+            .par_iter()
+            .with_min_len(16 * 1024)
+            .map(|&face| value(face))
+            .collect_into_vec(&mut column);
+        column.resize(entries + LANES, 0.0);
+        column
     }
 
     /// Whether a face was guessed to be hidden in the cell.
@@ -215,12 +237,14 @@ impl CellLists {
     }
 
     /// Calls `visit` with the faces of a cell whose box overlaps that of `extent` and which are, at
-    /// their nearest, nearer than it is at its farthest. `visit` returns whether to go on.
+    /// their nearest, nearer than it is at its farthest; not with those of the map `own`. `visit` returns
+    /// whether to go on.
     #[inline]
     pub fn overlapping(
         &self,
         cell: usize,
         extent: &Extent,
+        own: Option<u32>,
         mut visit: impl FnMut(FaceId) -> bool,
     ) -> bool {
         let load = |column: &[f32], at: usize| {
@@ -234,11 +258,14 @@ impl CellLists {
         let farthest = f32x8::splat(extent.nearness[0]);
         let (start, end) = (self.start[cell] as usize, self.start[cell + 1] as usize);
         for at in (start..end).step_by(LANES) {
-            let overlaps = load(&self.left, at).simd_lt(right)
+            let mut overlaps = load(&self.left, at).simd_lt(right)
                 & load(&self.right, at).simd_gt(left)
                 & load(&self.top, at).simd_lt(bottom)
                 & load(&self.bottom, at).simd_gt(top)
                 & load(&self.nearest, at).simd_ge(farthest);
+            if let Some(own) = own {
+                overlaps &= load(&self.map, at).simd_ne(f32x8::splat(own as f32));
+            }
             let in_cell = (1_u32 << (end - at).min(LANES)) - 1;
             let mut mask = overlaps.to_bitmask() & in_cell;
             while mask != 0 {

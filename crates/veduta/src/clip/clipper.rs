@@ -50,11 +50,15 @@ impl<'a> Clipper<'a> {
     }
 
     /// Makes `self.pieces` the fragments of `face` found before; one without corners is all of it.
-    pub fn resume<'f>(&mut self, face: FaceId, fragments: impl Iterator<Item = &'f [Corner]>) {
+    pub fn resume(
+        &mut self,
+        face: FaceId,
+        fragments: impl Iterator<Item = impl ExactSizeIterator<Item = Corner>>,
+    ) {
         self.tied = false;
         self.pieces.clear();
         for corners in fragments {
-            if corners.is_empty() {
+            if corners.len() == 0 {
                 self.pieces.start(face, self.context.faces.outline(face));
             } else {
                 self.pieces.add(corners);
@@ -75,6 +79,21 @@ impl<'a> Clipper<'a> {
         &mut self,
         face: FaceId,
         lists: &[&CellLists],
+        wanted: impl Fn(usize) -> bool,
+    ) {
+        self.subtract(face, lists, None, wanted);
+    }
+
+    /// The same by what is listed of other maps than that of `face`.
+    pub fn subtract_others(&mut self, face: FaceId, list: &CellLists, map: u32) {
+        self.subtract(face, &[list], Some(map), |_| true);
+    }
+
+    fn subtract(
+        &mut self,
+        face: FaceId,
+        lists: &[&CellLists],
+        own: Option<u32>,
         wanted: impl Fn(usize) -> bool,
     ) {
         let Self {
@@ -100,7 +119,7 @@ impl<'a> Clipper<'a> {
                     continue;
                 }
                 for list in lists {
-                    list.overlapping(cell, extent, |occluder| {
+                    list.overlapping(cell, extent, own, |occluder| {
                         if compared_with[occluder.index()] == stamp {
                             return true;
                         }

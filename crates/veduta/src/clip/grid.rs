@@ -20,7 +20,8 @@ const COORDINATE_MARGIN: f32 = 2.5e-7;
 const NEARNESS_MARGIN: f64 = 2e-7;
 
 impl Extent {
-    fn of(faces: &Faces, face: FaceId) -> Self {
+    /// The extent of a face.
+    pub fn of(faces: &Faces, face: FaceId) -> Self {
         let plane = faces.face_nearness(face);
         let mut min = DVec2::INFINITY;
         let mut max = DVec2::NEG_INFINITY;

@@ -14,7 +14,7 @@ mod grid;
 mod pieces;
 mod sides;
 
-pub(crate) use cells::{CellLists, OPEN, listed, listed_between};
+pub(crate) use cells::{CellLists, OPEN, listed_between, listed_of_maps};
 pub(crate) use clipper::{Clipper, Context};
 pub(crate) use found::{Entry, Found, Pile};
 pub(crate) use grid::{CellSet, Extent, Grid};

@@ -86,9 +86,9 @@ impl Pieces {
     }
 
     /// Adds a piece found before.
-    pub fn add(&mut self, corners: &[Corner]) {
+    pub fn add(&mut self, corners: impl Iterator<Item = Corner>) {
         let start = self.arena.len();
-        self.arena.extend_from_slice(corners);
+        self.arena.extend(corners);
         self.pieces.extend(Piece::from(&self.arena, start));
     }
 
@@ -126,18 +126,25 @@ impl Pieces {
             min = min.min(point);
             max = max.max(point);
         }
-        let mut pieces = std::mem::take(&mut self.pieces);
-        self.next.clear();
-        for piece in pieces.drain(..) {
-            let apart = piece.min.x >= max.x
+        let apart = |piece: &Piece| {
+            piece.min.x >= max.x
                 || piece.min.y >= max.y
                 || piece.max.x <= min.x
-                || piece.max.y <= min.y;
-            if apart || !self.cut_away(&piece, occluder, outline, sides, depth) {
+                || piece.max.y <= min.y
+        };
+        // A large face behind many small ones has hundreds of pieces, and most of them stay.
+        let Some(first) = self.pieces.iter().position(|piece| !apart(piece)) else {
+            return;
+        };
+        let mut pieces = std::mem::take(&mut self.pieces);
+        self.next.clear();
+        for piece in pieces.drain(first..) {
+            if apart(&piece) || !self.cut_away(&piece, occluder, outline, sides, depth) {
                 self.next.push(piece);
             }
         }
-        self.pieces = std::mem::replace(&mut self.next, pieces);
+        pieces.append(&mut self.next);
+        self.pieces = pieces;
     }
 
     /// Replaces `piece` by what the occluder leaves of it; false, and nothing is done, if that is

@@ -10,12 +10,16 @@
 //!   own map stays hidden.
 //! - [`composite`]: the same for stored maps with what is seen of their scenes, which are united.
 //! - [`hold_out`]: less what is seen of maps that only hide.
+//! - [`composite_spans`]: as the paper does it, for what multiscan found.
+//! - [`unite`]: whole scenes as one, for what casts shadows.
 //!
 //! Coplanar faces of different maps are decided by the order of their faces: priority of the layer,
 //! name of the object, face; whatever the order of the maps.
 
 mod merge;
+mod spans;
 mod unite;
 
 pub use merge::merge;
-pub use unite::{CompositeError, composite, hold_out};
+pub use spans::composite_spans;
+pub use unite::{CompositeError, composite, hold_out, unite};

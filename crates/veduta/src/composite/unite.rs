@@ -1,11 +1,14 @@
-use super::merge;
-use crate::scene::PlaneGroups;
+use super::merge::Meeting;
+use crate::scene::{FaceIndex, PlaneGroups};
 use std::cmp::Reverse;
+use std::collections::HashMap;
+use std::ops::Range;
+use veduta_geometry::DMat4;
 use veduta_map::scene::{
     Image, ImageId, Layer, Material, Mesh, MeshId, Object, ObjectKey, Scene, World,
 };
 use veduta_map::{
-    Affine, Camera, FaceId, Faces, MaterialId, ObjectId, PlaneId, Projection, Seen, SeenScene,
+    Camera, FaceId, Faces, MaterialId, ObjectId, ObjectMesh, PlaneId, Projection, Seen, SeenScene,
     VisibilityMap,
 };
 
@@ -32,6 +35,14 @@ pub enum CompositeError {
         /// In what they differ.
         difference: String,
     },
+    /// Spans meet on common sub-scanlines only.
+    #[error("picture {index} was sampled otherwise than the first: {difference}")]
+    OtherSampling {
+        /// Which of the pictures.
+        index: usize,
+        /// In what they differ.
+        difference: String,
+    },
 }
 
 /// What is seen of all maps together: composite(A, B, …) is the map of A and B and …
@@ -53,17 +64,12 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
     let shown = maps.len();
     let maps: Vec<&SeenScene> = maps.iter().chain(holdouts).collect();
     let first = maps.first().ok_or(CompositeError::Nothing)?;
-    for (index, other) in maps.iter().enumerate().skip(1) {
-        if let Some(difference) = camera_difference(&first.map.camera, &other.map.camera) {
-            return Err(CompositeError::OtherCamera { index, difference });
-        }
-        if let Some(difference) = world_difference(&first.scene.world, &other.scene.world) {
-            return Err(CompositeError::OtherWorld { index, difference });
-        }
-    }
-    let united = UnitedScenes::of(&maps);
-    let groups = PlaneGroups::of(&united.scene);
-    let (faces, new_ids) = united.faces(&maps, &groups);
+    let views = maps.iter();
+    refuse_other_views(views.map(|seen| (&seen.map.camera, &seen.scene.world)))?;
+    let scenes: Vec<&Scene> = maps.iter().map(|seen| &seen.scene).collect();
+    let united = UnitedScenes::of(&scenes);
+    let tables: Vec<&Faces> = maps.iter().map(|seen| &seen.map.faces).collect();
+    let (mut faces, new_ids) = united.faces(&tables);
     let seen: Vec<Seen> = maps
         .iter()
         .zip(&new_ids)
@@ -81,20 +87,57 @@ pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene,
         near: nears.fold(f64::INFINITY, f64::min),
         ..first.map.camera
     };
-    let mut is_shown = vec![false; faces.len()];
-    for face in new_ids[..shown].iter().flatten() {
-        is_shown[face.index()] = true;
+    let mut meeting = Meeting::of(&faces, &seen, camera.aspect());
+    united.share_planes(&mut faces, &mut meeting);
+    let Seen {
+        mut opaque,
+        mut veils,
+    } = meeting.merge(&faces);
+    if shown < maps.len() {
+        let mut is_shown = vec![false; faces.len()];
+        for face in new_ids[..shown].iter().flatten() {
+            is_shown[face.index()] = true;
+        }
+        for fragments in [&mut opaque, &mut veils] {
+            *fragments = fragments.selected(|face| is_shown[face.index()]);
+        }
     }
-    let Seen { opaque, veils } = merge(&faces, &seen, camera.aspect());
-    let [opaque, veils] =
-        [opaque, veils].map(|fragments| fragments.selected(|face| is_shown[face.index()]));
     let map = VisibilityMap {
         camera,
         faces,
         opaque,
         veils,
     };
-    Ok(SeenScene::of(&united.scene, &map, first.size))
+    Ok(SeenScene::of_meshes(
+        &united.scene,
+        &united.meshes,
+        &map,
+        first.size,
+    ))
+}
+
+/// Fails on the first view that cannot be composited with that before all.
+pub(super) fn refuse_other_views<'a>(
+    mut views: impl Iterator<Item = (&'a Camera, &'a World)>,
+) -> Result<(), CompositeError> {
+    let Some((camera, world)) = views.next() else {
+        return Err(CompositeError::Nothing);
+    };
+    for (index, (other_camera, other_world)) in (1..).zip(views) {
+        if let Some(difference) = camera_difference(camera, other_camera) {
+            return Err(CompositeError::OtherCamera { index, difference });
+        }
+        if let Some(difference) = world_difference(world, other_world) {
+            return Err(CompositeError::OtherWorld { index, difference });
+        }
+    }
+    Ok(())
+}
+
+/// Scenes as one, with their objects in the order of [`Scene::key_order`]; also where they are told scene
+/// by scene or united before. Cameras, meshes without an object and layers without one are left out.
+pub fn unite(scenes: &[&Scene]) -> Scene {
+    UnitedScenes::of(scenes).into_scene()
 }
 
 /// In what two cameras differ, in words for the user. Near planes may: nearness does not depend on them.
@@ -162,53 +205,59 @@ fn world_difference(one: &World, other: &World) -> Option<String> {
     })
 }
 
-/// The scenes of several maps as one.
-struct UnitedScenes {
+/// Several scenes as one.
+pub(super) struct UnitedScenes<'a> {
+    /// Without meshes.
     scene: Scene,
-    /// Of each map, the new numbers of its objects.
+    /// Those of its objects.
+    meshes: Vec<ObjectMesh<'a>>,
+    /// Of each of the scenes, the new numbers of its objects.
     objects: Vec<Vec<ObjectId>>,
 }
 
-impl UnitedScenes {
-    fn of(maps: &[&SeenScene]) -> Self {
-        let mut scene = Scene {
-            world: maps
-                .iter()
-                .map(|seen| &seen.scene.world)
-                .find(|world| world.crs.is_some())
-                .unwrap_or(&maps[0].scene.world)
-                .clone(),
+impl<'a> UnitedScenes<'a> {
+    pub fn of(scenes: &[&'a Scene]) -> Self {
+        let placed = scenes.iter().find(|scene| scene.world.crs.is_some());
+        let mut united = Scene {
+            world: placed
+                .or(scenes.first())
+                .map_or_else(World::default, |scene| scene.world.clone()),
             ..Scene::default()
         };
         let mut order: Vec<(ObjectKey, usize, ObjectId)> = Vec::new();
-        for (map, SeenScene { scene, .. }) in maps.iter().enumerate() {
+        for (number, scene) in scenes.iter().enumerate() {
             let objects = (0..scene.objects.len()).map(ObjectId::from_index);
-            order.extend(objects.map(|object| (scene.key_of(object), map, object)));
+            order.extend(objects.map(|object| (scene.key_of(object), number, object)));
         }
         order.sort_unstable();
-        let has_layers = maps.iter().any(|seen| !seen.scene.layers.is_empty());
-        let mut objects: Vec<Vec<ObjectId>> = maps
+        let has_layers = scenes.iter().any(|scene| !scene.layers.is_empty());
+        let mut objects: Vec<Vec<ObjectId>> = scenes
             .iter()
-            .map(|seen| vec![ObjectId(0); seen.scene.objects.len()])
+            .map(|scene| vec![ObjectId(0); scene.objects.len()])
             .collect();
-        let mut meshes: Vec<&Mesh> = Vec::new();
-        let mut of_map: Vec<usize> = Vec::new();
-        for &((Reverse(priority), layer, _), map, object) in &order {
-            let id = ObjectId::from_index(scene.objects.len());
-            objects[map][object.index()] = id;
-            let from = &maps[map].scene;
-            meshes.push(from.mesh_of(object));
-            of_map.push(map);
-            scene.objects.push(Object {
+        let first_material: Vec<u32> = scenes
+            .iter()
+            .map(|scene| add_materials(&mut united, &scene.materials, &scene.images))
+            .collect();
+        let mut meshes: Vec<ObjectMesh> = Vec::with_capacity(order.len());
+        for &((Reverse(priority), layer, _), number, object) in &order {
+            let id = ObjectId::from_index(united.objects.len());
+            objects[number][object.index()] = id;
+            let from = scenes[number];
+            meshes.push(ObjectMesh {
+                mesh: from.mesh_of(object),
+                first_material: first_material[number],
+            });
+            united.objects.push(Object {
                 mesh: MeshId(id.0),
                 ..from.object(object).clone()
             });
             if has_layers {
-                match scene.layers.last_mut() {
+                match united.layers.last_mut() {
                     Some(last) if last.name == layer && last.priority == priority => {
                         last.objects.end = id.0 + 1;
                     }
-                    _ => scene.layers.push(Layer {
+                    _ => united.layers.push(Layer {
                         name: layer.into(),
                         priority,
                         objects: id.0..id.0 + 1,
@@ -216,62 +265,98 @@ impl UnitedScenes {
                 }
             }
         }
-        let first_material: Vec<u32> = maps
-            .iter()
-            .map(|seen| add_materials(&mut scene, &seen.scene.materials, &seen.scene.images))
-            .collect();
-        for (mesh, map) in meshes.into_iter().zip(of_map) {
-            let mut mesh = mesh.clone();
-            for (_, material) in &mut mesh.materials {
-                *material = MaterialId(material.0 + first_material[map]);
+        for light in scenes.iter().flat_map(|scene| &scene.lights) {
+            if !united.lights.contains(light) {
+                united.lights.push(light.clone());
             }
-            scene.meshes.push(mesh);
         }
-        for seen in maps {
-            for light in &seen.scene.lights {
-                if !scene.lights.contains(light) {
-                    scene.lights.push(light.clone());
+        Self {
+            scene: united,
+            meshes,
+            objects,
+        }
+    }
+
+    /// The scene with its meshes. Objects that shared one go on to do so.
+    pub fn into_scene(self) -> Scene {
+        let mut scene = self.scene;
+        let mut known: HashMap<*const Mesh, MeshId> = HashMap::new();
+        for (object, of) in scene.objects.iter_mut().zip(&self.meshes) {
+            object.mesh = *known.entry(std::ptr::from_ref(of.mesh)).or_insert_with(|| {
+                let mut mesh = of.mesh.clone();
+                for (_, material) in &mut mesh.materials {
+                    *material = MaterialId(material.0 + of.first_material);
+                }
+                scene.meshes.push(mesh);
+                MeshId(scene.meshes.len() as u32 - 1)
+            });
+        }
+        scene
+    }
+
+    /// The faces of all scenes as one table in the order of the objects, and of each scene the new
+    /// numbers of its faces.
+    pub fn faces(&self, tables: &[&Faces]) -> (Faces, Vec<Vec<FaceId>>) {
+        // Faces of an object follow one another in its table.
+        let mut runs: Vec<(ObjectId, usize, Range<u32>)> = Vec::new();
+        for (map, table) in tables.iter().enumerate() {
+            for face in table.ids() {
+                let object = self.objects[map][table.object(face).index()];
+                match runs.last_mut() {
+                    Some(run) if run.0 == object && run.1 == map => run.2.end += 1,
+                    _ => runs.push((object, map, face.0..face.0 + 1)),
                 }
             }
         }
-        Self { scene, objects }
+        runs.sort_by_key(|run| run.0);
+        let count = tables.iter().map(|table| table.len()).sum();
+        let mut faces = Faces::with_capacity(count);
+        let mut new_ids: Vec<Vec<FaceId>> = tables
+            .iter()
+            .map(|table| vec![FaceId(0); table.len()])
+            .collect();
+        let mut first_plane = Vec::with_capacity(tables.len());
+        for table in tables {
+            first_plane.push(faces.planes().len() as u32);
+            for &plane in table.planes() {
+                faces.push_plane(plane);
+            }
+        }
+        for (object, map, run) in runs {
+            let table = tables[map];
+            for face in run.map(FaceId) {
+                let plane = PlaneId(table.plane(face).0 + first_plane[map]);
+                let source = table.source(face);
+                new_ids[map][face.index()] = faces.push_row(table, face, plane, object, source);
+            }
+        }
+        (faces, new_ids)
     }
 
-    /// The faces of all maps as one table in the order of the objects, and of each map the new numbers
-    /// of its faces. Faces of one plane share it.
-    fn faces(&self, maps: &[&SeenScene], groups: &PlaneGroups) -> (Faces, Vec<Vec<FaceId>>) {
-        let mut order: Vec<(ObjectId, FaceId, usize)> = Vec::new();
-        for (map, seen) in maps.iter().enumerate() {
-            let table = &seen.map.faces;
-            let object = |face: FaceId| self.objects[map][table.object(face).index()];
-            order.extend(table.ids().map(|face| (object(face), face, map)));
-        }
-        order.sort_unstable();
-        let mut faces = Faces::with_capacity(order.len());
-        let mut new_ids: Vec<Vec<FaceId>> = maps
-            .iter()
-            .map(|seen| vec![FaceId(0); seen.map.faces.len()])
+    /// Gives faces of different maps that meet in one plane that plane.
+    fn share_planes(&self, faces: &mut Faces, meeting: &mut Meeting) {
+        let objects = self.scene.objects.iter();
+        let placed: Vec<(&Mesh, DMat4)> = objects
+            .zip(&self.meshes)
+            .map(|(object, of)| (of.mesh, object.world_from_object))
             .collect();
-        let mut first_plane = Vec::with_capacity(maps.len());
-        for seen in maps {
-            first_plane.push(faces.planes().len() as u32);
-            let planes: &[Affine] = seen.map.faces.planes();
-            planes.iter().for_each(|&plane| {
-                faces.push_plane(plane);
-            });
+        let index_of = |faces: &Faces, face: FaceId| (faces.object(face).0, faces.source(face));
+        let candidates: Vec<(FaceId, (FaceIndex, u32))> = meeting
+            .faces()
+            .into_iter()
+            .map(|(face, map)| (face, (index_of(faces, face), map)))
+            .collect();
+        let indices: Vec<(FaceIndex, u32)> = candidates.iter().map(|pair| pair.1).collect();
+        let groups = PlaneGroups::among_maps(&placed, &indices);
+        let id_of = |index: FaceIndex| {
+            let row = candidates.partition_point(|&(_, (other, _))| other < index);
+            candidates[row].0
+        };
+        for &(face, first) in groups.pairs() {
+            let face = id_of(face);
+            faces.share_plane(face, id_of(first));
+            meeting.plane_changed(faces, face);
         }
-        for (object, face, map) in order {
-            let table = &maps[map].map.faces;
-            let plane = PlaneId(table.plane(face).0 + first_plane[map]);
-            let id = faces.push(table.outline(face), plane, object, table.source(face));
-            let id = id.expect("a face of a table has an area");
-            if table.is_veil(face) {
-                faces.set_veil(id);
-            }
-            new_ids[map][face.index()] = id;
-        }
-        groups.share_planes(&mut faces);
-        (faces, new_ids)
     }
 }
 

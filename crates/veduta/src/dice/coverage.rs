@@ -1,4 +1,4 @@
-use crate::dice::{Bands, Dicer, PixelGrid};
+use crate::dice::{Bands, Dicer, Parts, PixelGrid};
 use rayon::prelude::*;
 use veduta_geometry::Cells;
 use veduta_map::{FaceId, VisibilityMap};
@@ -27,7 +27,7 @@ pub fn coverage(map: &VisibilityMap, grid: &PixelGrid) -> Vec<Coverage> {
 
 fn coverage_of_band(map: &VisibilityMap, bands: &Bands, band: usize) -> Vec<Coverage> {
     let grid = bands.grid();
-    let mut dicer = Dicer::default();
+    let mut dicer = Dicer::<Parts>::default();
     let mut rows = Vec::new();
     let opaque = bands.fragments(band).iter();
     for &fragment in opaque.take_while(|&&fragment| (fragment as usize) < map.opaque.len()) {
@@ -41,7 +41,7 @@ fn coverage_of_band(map: &VisibilityMap, bands: &Bands, band: usize) -> Vec<Cove
             });
         };
         dicer
-            .grid_areas
+            .finder
             .each_cell(polygon, grid.width, bands.rows(band), |cells| match cells {
                 Cells::Boundary { column, row, area } => push(column, row, area),
                 Cells::Inside { row, columns } => columns.for_each(|column| push(column, row, 1.0)),

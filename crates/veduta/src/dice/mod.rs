@@ -15,6 +15,9 @@
 //! 3. Where veils (faces that are not fully opaque) are seen, [`attenuate`] makes of each part's area what
 //!    is left of it behind the veils before it, once their opacities are known.
 //!
+//! For filters that reach beyond a pixel the same is done on cells around it, with all moments of parts instead
+//! of areas ([`CellParts`], [`PixelGrid::between_centres`]).
+//!
 //! [`dice_spans`] does the same for what multiscan found. [`sum_by_face`] tells which faces a pixel
 //! shows, for all that is not light. [`coverage`] gives the areas in f64, for measuring; [`Depths`] how
 //! deep parts reach, for deep pictures. [`Region`] are the pixels that are made where only some are.
@@ -22,6 +25,7 @@
 mod bands;
 mod coverage;
 mod depth;
+mod measure;
 mod pixel_grid;
 mod place;
 mod region;
@@ -32,6 +36,7 @@ mod veils;
 pub use bands::{BAND_ROWS, Bands};
 pub use coverage::{Coverage, coverage};
 pub use depth::{DepthRange, Depths, depth_of_nearness};
+pub use measure::{CellParts, Diced, Measure};
 pub use pixel_grid::PixelGrid;
 pub use region::Region;
 pub use shares::{Share, largest, sum_by_face};
@@ -40,7 +45,7 @@ pub use veils::{VeilBuffers, attenuate};
 
 use place::Placer;
 use std::ops::Range;
-use veduta_geometry::{Cells, GridAreas, Vec2};
+use veduta_geometry::{Cells, Vec2};
 use veduta_map::VisibilityMap;
 
 /// What a fragment covers of a pixel that it does not fill, or fills just so.
@@ -87,28 +92,27 @@ pub struct Parts {
 
 /// Buffers that [`dice`] keeps from band to band.
 #[derive(Clone, Debug, Default)]
-pub struct Dicer {
+pub struct Dicer<D: Diced = Parts> {
     placer: Placer,
-    grid_areas: GridAreas,
-    veils: Vec<Part>,
+    finder: D::Finder,
+    veils: D,
     /// Whether a veil touches a pixel of the band; empty if there is none.
     veiled: Vec<bool>,
 }
 
-/// Dices the fragments of band `band`; `parts` is overwritten.
+/// Dices the fragments of band `band`; `diced` is overwritten.
 ///
 /// `varies` says of a fragment whether its radiance varies over it. Only then, and for veils,
 /// centroids are found, which take about half as long again as areas.
-pub fn dice(
+pub fn dice<D: Diced>(
     map: &VisibilityMap,
     bands: &Bands,
     band: usize,
     varies: impl Fn(u32) -> bool,
-    dicer: &mut Dicer,
-    parts: &mut Parts,
+    dicer: &mut Dicer<D>,
+    diced: &mut D,
 ) {
-    parts.boundary.clear();
-    parts.runs.clear();
+    diced.clear();
     let grid = bands.grid();
     let rows = bands.rows(band);
     let index_of = |column: u32, row: u32| (row - rows.start) * grid.width + column;
@@ -119,56 +123,59 @@ pub fn dice(
     dicer.dice_veils(map, bands, band, veils);
     for &fragment in opaque {
         let polygon = dicer.placer.place(map, grid, fragment);
-        let (areas, veiled) = (&mut dicer.grid_areas, &dicer.veiled);
-        let Parts { boundary, runs } = parts;
-        let mut push_run = |columns: Range<u32>, row: u32| {
+        let veiled = &dicer.veiled;
+        let push_run = |columns: Range<u32>, row: u32, diced: &mut D| {
             if !columns.is_empty() {
-                runs.push(Run {
+                diced.parts_mut().runs.push(Run {
                     pixel: index_of(columns.start, row),
                     length: columns.end - columns.start,
                     fragment,
                 });
             }
         };
-        let mut push_inside = |row: u32, columns: Range<u32>, boundary: &mut Vec<Part>| {
-            if veiled.is_empty() {
-                return push_run(columns, row);
+        let visit = |cells: Cells<(D::Measure, Vec2)>| match cells {
+            Cells::Boundary { column, row, area } => {
+                let part = Part::new(index_of(column, row), fragment, &area);
+                diced.push(part, area.0);
             }
-            let mut start = columns.start;
-            for column in columns.clone() {
-                let pixel = index_of(column, row);
-                if veiled[pixel as usize] {
-                    push_run(start..column, row);
-                    boundary.push(Part::whole(pixel, fragment));
-                    start = column + 1;
+            Cells::Inside { row, columns } if veiled.is_empty() => push_run(columns, row, diced),
+            Cells::Inside { row, columns } => {
+                let mut start = columns.start;
+                for column in columns.clone() {
+                    let pixel = index_of(column, row);
+                    if veiled[pixel as usize] {
+                        push_run(start..column, row, diced);
+                        diced.push(Part::whole(pixel, fragment), D::Measure::whole());
+                        start = column + 1;
+                    }
                 }
+                push_run(start..columns.end, row, diced);
             }
-            push_run(start..columns.end, row);
         };
-        if varies(fragment) {
-            areas.each_cell_with_moments(polygon, grid.width, rows.clone(), |cells| match cells {
-                Cells::Boundary { column, row, area } => boundary.push(Part {
-                    pixel: index_of(column, row),
-                    fragment,
-                    area: area.area as f32,
-                    centroid: area.centroid().as_vec2(),
-                }),
-                Cells::Inside { row, columns } => push_inside(row, columns, boundary),
-            });
-        } else {
-            areas.each_cell(polygon, grid.width, rows.clone(), |cells| match cells {
-                Cells::Boundary { column, row, area } => boundary.push(Part {
-                    area: area as f32,
-                    ..Part::whole(index_of(column, row), fragment)
-                }),
-                Cells::Inside { row, columns } => push_inside(row, columns, boundary),
-            });
-        }
+        let finder = &mut dicer.finder;
+        D::each_cell(
+            finder,
+            polygon,
+            grid.width,
+            rows.clone(),
+            varies(fragment),
+            visit,
+        );
     }
-    parts.boundary.append(&mut dicer.veils);
+    diced.append(&mut dicer.veils);
 }
 
 impl Part {
+    #[inline(always)]
+    fn new<M: Measure>(pixel: u32, fragment: u32, (measure, centroid): &(M, Vec2)) -> Self {
+        Self {
+            pixel,
+            fragment,
+            area: measure.area() as f32,
+            centroid: *centroid,
+        }
+    }
+
     /// All of a pixel.
     fn whole(pixel: u32, fragment: u32) -> Self {
         Self {
@@ -180,16 +187,16 @@ impl Part {
     }
 }
 
-impl Dicer {
+impl<D: Diced> Dicer<D> {
     /// Dices the fragments of veils, and marks the pixels that they touch.
     fn dice_veils(&mut self, map: &VisibilityMap, bands: &Bands, band: usize, veils: &[u32]) {
         let Self {
             placer,
-            grid_areas,
-            veils: parts,
+            finder,
+            veils: diced,
             veiled,
         } = self;
-        parts.clear();
+        diced.clear();
         veiled.clear();
         if veils.is_empty() {
             return;
@@ -201,20 +208,25 @@ impl Dicer {
         for &fragment in veils {
             let polygon = placer.place(map, grid, fragment);
             let rows = rows.clone();
-            grid_areas.each_cell_with_moments(polygon, grid.width, rows, |cells| match cells {
-                Cells::Boundary { column, row, area } => parts.push(Part {
-                    pixel: index_of(column, row),
-                    fragment,
-                    area: area.area as f32,
-                    centroid: area.centroid().as_vec2(),
-                }),
-                Cells::Inside { row, columns } => {
-                    parts
-                        .extend(columns.map(|column| Part::whole(index_of(column, row), fragment)));
-                }
-            });
+            D::each_cell(
+                finder,
+                polygon,
+                grid.width,
+                rows,
+                true,
+                |cells| match cells {
+                    Cells::Boundary { column, row, area } => {
+                        let part = Part::new(index_of(column, row), fragment, &area);
+                        diced.push(part, area.0);
+                    }
+                    Cells::Inside { row, columns } => columns.for_each(|column| {
+                        let part = Part::whole(index_of(column, row), fragment);
+                        diced.push(part, D::Measure::whole());
+                    }),
+                },
+            );
         }
-        for part in parts {
+        for part in &diced.parts().boundary {
             veiled[part.pixel as usize] = true;
         }
     }

@@ -47,6 +47,24 @@ impl PixelGrid {
         }
     }
 
+    /// The grid of cells between the centres of pixels that lie within `radius` pixels from the centres
+    /// of these: the first begins at `radius` before the first centre, along both axes. `cells` cells
+    /// lie along the side of a pixel.
+    ///
+    /// # Panics
+    /// If `radius` or `cells` is 0.
+    pub fn between_centres(&self, radius: u32, cells: u32) -> Self {
+        assert!(radius > 0 && cells > 0, "a filter reaches the next centre");
+        let before = f64::from(radius) - 0.5;
+        let across = |pixels: u32| (pixels + 2 * radius - 1) * cells;
+        Self {
+            width: across(self.width),
+            height: across(self.height),
+            pixels_per_frame: self.pixels_per_frame * f64::from(cells),
+            origin: (self.origin - before) * f64::from(cells),
+        }
+    }
+
     /// Pixel coordinates of an image point.
     #[inline(always)]
     pub fn pixels_from_image(&self, image: DVec2) -> DVec2 {

@@ -21,7 +21,7 @@
 //!   front.
 
 use super::place::PixelClip;
-use super::{Parts, PixelGrid};
+use super::{Diced, Measure, PixelGrid};
 use std::ops::Range;
 use veduta_geometry::{Affine, DVec2, cross, signed_area};
 use veduta_map::{FaceId, VisibilityMap};
@@ -39,11 +39,11 @@ const QUARTERINGS: u32 = 5;
 
 /// Buffers that [`attenuate`] keeps.
 #[derive(Clone, Debug, Default)]
-pub struct VeilBuffers {
+pub struct VeilBuffers<M = f64> {
     veiled: Vec<bool>,
     /// `(pixel, part)` of the parts in pixels with veils.
     entries: Vec<(u32, u32)>,
-    layers: Vec<Layer>,
+    layers: Vec<Layer<M>>,
     /// Corners of the layers' polygons, from the pixel's corner.
     points: Vec<DVec2>,
     clip: PixelClip,
@@ -52,45 +52,48 @@ pub struct VeilBuffers {
 
 /// A veil in a pixel, or in a cell of one.
 #[derive(Clone, Copy, Debug)]
-struct Layer {
+struct Layer<M = f64> {
     /// Its part.
     part: u32,
     face: FaceId,
     /// Nearness from the pixel's corner, in pixels.
     plane: Affine,
     opacity: f64,
-    area: f64,
+    /// Of its polygon.
+    measure: M,
     /// Its polygon: rows of the points.
     start: u32,
     end: u32,
     extent: Extent,
 }
 
-impl Layer {
+impl<M> Layer<M> {
     fn polygon<'a>(&self, points: &'a [DVec2]) -> &'a [DVec2] {
         &points[self.start as usize..self.end as usize]
     }
 
     /// Whether this one hides `other` where both have the same nearness.
-    fn wins_tie(&self, other: &Layer) -> bool {
+    fn wins_tie(&self, other: &Self) -> bool {
         self.face < other.face
     }
 }
 
-/// Makes of each part's area what is seen of it: see [`Part::area`](super::Part::area).
+/// Makes of each part's area, or moments, those of what is seen of it: see
+/// [`Part::area`](super::Part::area).
 ///
-/// `opacities` are those of the parts of veils, which are the last of `parts`. The parts are of the band
+/// `opacities` are those of the parts of veils, which are the last of `diced`. The parts are of the band
 /// of `grid` that begins at row `first_row`.
-pub fn attenuate(
+pub fn attenuate<D: Diced>(
     map: &VisibilityMap,
     grid: &PixelGrid,
     first_row: u32,
     opacities: &[f32],
-    buffers: &mut VeilBuffers,
-    parts: &mut Parts,
+    buffers: &mut VeilBuffers<D::Measure>,
+    diced: &mut D,
 ) {
-    let first_veil = parts.boundary.len() - opacities.len();
-    let Some(last) = parts.boundary[first_veil..].iter().map(|p| p.pixel).max() else {
+    let boundary = &diced.parts().boundary;
+    let first_veil = boundary.len() - opacities.len();
+    let Some(last) = boundary[first_veil..].iter().map(|p| p.pixel).max() else {
         return;
     };
     let VeilBuffers {
@@ -98,11 +101,11 @@ pub fn attenuate(
     } = buffers;
     veiled.clear();
     veiled.resize(last as usize + 1, false);
-    for part in &parts.boundary[first_veil..] {
+    for part in &boundary[first_veil..] {
         veiled[part.pixel as usize] = true;
     }
     entries.clear();
-    let rows = parts.boundary.iter().zip(0..);
+    let rows = boundary.iter().zip(0..);
     let is_veiled = |pixel: u32| veiled.get(pixel as usize).copied().unwrap_or(false);
     entries
         .extend(rows.filter_map(|(part, row)| is_veiled(part.pixel).then_some((part.pixel, row))));
@@ -118,7 +121,7 @@ pub fn attenuate(
             map,
             grid,
             corner,
-            parts,
+            diced,
             buffers,
         };
         pixel.lay(veils, opacities, first_veil);
@@ -128,16 +131,16 @@ pub fn attenuate(
 }
 
 /// A pixel at work.
-struct Pixel<'a> {
+struct Pixel<'a, D: Diced> {
     map: &'a VisibilityMap,
     grid: &'a PixelGrid,
     /// Its top left corner in the grid.
     corner: DVec2,
-    parts: &'a mut Parts,
-    buffers: &'a mut VeilBuffers,
+    diced: &'a mut D,
+    buffers: &'a mut VeilBuffers<D::Measure>,
 }
 
-impl Pixel<'_> {
+impl<D: Diced> Pixel<'_, D> {
     /// Makes layers of the parts of veils. What lets all through is done.
     fn lay(&mut self, veils: &[(u32, u32)], opacities: &[f32], first_veil: usize) {
         let Self { map, grid, .. } = *self;
@@ -150,18 +153,18 @@ impl Pixel<'_> {
         layers.clear();
         points.clear();
         for &(_, row) in veils {
-            let part = &mut self.parts.boundary[row as usize];
+            let fragment = self.diced.parts().boundary[row as usize].fragment;
             let opacity = f64::from(opacities[row as usize - first_veil]);
             let start = points.len() as u32;
-            let area = f64::from(part.area);
+            let measure = self.diced.measure(row as usize);
             if opacity > 0.0 {
-                points.extend_from_slice(clip.clip(map, grid, part.fragment, self.corner));
+                points.extend_from_slice(clip.clip(map, grid, fragment, self.corner));
             }
             if points.len() as u32 == start {
-                part.area = (area * opacity) as f32;
+                self.diced.set_measure(row as usize, measure * opacity);
                 continue;
             }
-            let face = map.face_of(part.fragment as usize);
+            let face = map.face_of(fragment as usize);
             let nearness = map.faces.face_nearness(face);
             let scale = grid.pixels_per_frame;
             layers.push(Layer {
@@ -173,7 +176,7 @@ impl Pixel<'_> {
                     nearness.at(grid.image_from_pixels(self.corner)),
                 ),
                 opacity,
-                area,
+                measure,
                 start,
                 end: points.len() as u32,
                 extent: Extent::of(&points[start as usize..]),
@@ -190,24 +193,24 @@ impl Pixel<'_> {
             cutter,
             ..
         } = &mut *self.buffers;
-        let parts = &mut self.parts.boundary;
+        let diced = &mut *self.diced;
         if layers.len() > MOST_QUARTERED || sort(layers, &Extent::UNIT_SQUARE) {
             cutter.from_the_front(layers, points, &Extent::UNIT_SQUARE, |part, seen| {
-                parts[part as usize].area = seen as f32;
+                diced.set_measure(part as usize, seen);
             });
             for &(_, row) in opaque {
-                let part = &mut parts[row as usize];
-                let (area, regions) = (f64::from(part.area), &mut cutter.regions);
+                let row = row as usize;
+                let (measure, regions) = (diced.measure(row), &mut cutter.regions);
                 let seen = if regions.is_uncut() {
-                    // The area as diced is more exact than that of what is clipped.
-                    area * regions.regions[0].transmittance
-                } else if area >= 1.0 {
+                    // What was diced is more exact than what is clipped.
+                    measure * regions.regions[0].transmittance
+                } else if measure.area() >= 1.0 {
                     regions.total()
                 } else {
-                    let polygon = clip.clip(self.map, self.grid, part.fragment, self.corner);
-                    regions.through(polygon)
+                    let fragment = diced.parts().boundary[row].fragment;
+                    regions.through(clip.clip(self.map, self.grid, fragment, self.corner))
                 };
-                part.area = seen as f32;
+                diced.set_measure(row, seen);
             }
             return;
         }
@@ -215,17 +218,17 @@ impl Pixel<'_> {
         let mut surfaces = Vec::new();
         for &(_, row) in opaque {
             let start = points.len();
-            let fragment = parts[row as usize].fragment;
+            let fragment = diced.parts().boundary[row as usize].fragment;
             points.extend_from_slice(clip.clip(self.map, self.grid, fragment, self.corner));
             surfaces.push((row, start..points.len()));
         }
-        let mut told: Vec<(u32, f64)> = Vec::new();
+        let mut told: Vec<(u32, D::Measure)> = Vec::new();
         let rows = layers.iter().map(|layer| layer.part);
         told.extend(
             rows.chain(surfaces.iter().map(|surface| surface.0))
-                .map(|row| (row, 0.0)),
+                .map(|row| (row, D::Measure::default())),
         );
-        let mut tell = |row: u32, area: f64| told.push((row, area));
+        let mut tell = |row: u32, seen: D::Measure| told.push((row, seen));
         cutter.without_order(
             layers,
             points,
@@ -237,21 +240,22 @@ impl Pixel<'_> {
         // Stable: what was told of a part is summed in the order of its telling.
         told.sort_by_key(|&(row, _)| row);
         for of_part in told.chunk_by(|a, b| a.0 == b.0) {
-            let seen: f64 = of_part.iter().map(|&(_, area)| area).sum();
-            parts[of_part[0].0 as usize].area = seen as f32;
+            let mut sum = D::Measure::default();
+            of_part.iter().for_each(|&(_, seen)| sum += seen);
+            diced.set_measure(of_part[0].0 as usize, sum);
         }
     }
 }
 
 /// Sorts layers from front to back by their planes at the centre of `cell`, and tells whether that is
 /// right wherever two of them overlap.
-fn sort(layers: &mut [Layer], cell: &Extent) -> bool {
+fn sort<M>(layers: &mut [Layer<M>], cell: &Extent) -> bool {
     let centre = 0.5 * (cell.min + cell.max);
     layers.sort_by(|a, b| {
         let by_nearness = b.plane.at(centre).total_cmp(&a.plane.at(centre));
         by_nearness.then(a.face.cmp(&b.face))
     });
-    let in_order = |front: &Layer, back: &Layer| {
+    let in_order = |front: &Layer<M>, back: &Layer<M>| {
         let both = front.extent.and(&back.extent);
         let Some(both) = both.filter(|_| front.face != back.face) else {
             return true;
@@ -274,23 +278,23 @@ struct Cutter {
 impl Cutter {
     /// Takes sorted layers one after the other, and tells `seen` of each part; leaves in the regions what
     /// they let through.
-    fn from_the_front(
+    fn from_the_front<M: Measure>(
         &mut self,
-        layers: &[Layer],
+        layers: &[Layer<M>],
         points: &[DVec2],
         cell: &Extent,
-        mut seen: impl FnMut(u32, f64),
+        mut seen: impl FnMut(u32, M),
     ) {
         let regions = &mut self.regions;
         regions.begin(&cell.corners());
         let cell_area = cell.area();
         for layer in layers {
-            let before = if layer.area >= cell_area {
+            let before = if layer.measure.area() >= cell_area {
                 regions.dim(layer.opacity)
             } else if regions.is_uncut() {
                 let transmittance = regions.regions[0].transmittance;
-                regions.cut(layer.polygon(points), &layer.extent, layer.opacity);
-                layer.area * transmittance
+                regions.cut::<f64>(layer.polygon(points), &layer.extent, layer.opacity);
+                layer.measure * transmittance
             } else {
                 regions.cut(layer.polygon(points), &layer.extent, layer.opacity)
             };
@@ -299,12 +303,12 @@ impl Cutter {
     }
 
     /// Cuts each layer by the parts of the others before it, and opaque surfaces by all.
-    fn each_by_all(
+    fn each_by_all<M: Measure>(
         &mut self,
-        layers: &[Layer],
+        layers: &[Layer<M>],
         points: &[DVec2],
         surfaces: &[(u32, Range<usize>)],
-        seen: &mut impl FnMut(u32, f64),
+        seen: &mut impl FnMut(u32, M),
     ) {
         let Self { regions, front } = self;
         for layer in layers {
@@ -313,29 +317,29 @@ impl Cutter {
                 let difference = other.plane.minus(&layer.plane);
                 part_before(other, layer, &difference, other.polygon(points), front);
                 if front.len() >= 3 {
-                    regions.cut(front, &Extent::of(front), other.opacity);
+                    regions.cut::<f64>(front, &Extent::of(front), other.opacity);
                 }
             }
-            seen(layer.part, regions.total() * layer.opacity);
+            seen(layer.part, regions.total::<M>() * layer.opacity);
         }
         for (row, polygon) in surfaces {
             regions.begin(&points[polygon.clone()]);
             for other in layers {
-                regions.cut(other.polygon(points), &other.extent, other.opacity);
+                regions.cut::<f64>(other.polygon(points), &other.extent, other.opacity);
             }
             seen(*row, regions.total());
         }
     }
 
     /// Finds what is seen in a cell that is a pixel quartered `depth` times, whose layers have no order.
-    fn without_order(
+    fn without_order<M: Measure>(
         &mut self,
-        layers: &mut [Layer],
+        layers: &mut [Layer<M>],
         points: &mut Vec<DVec2>,
         surfaces: &[(u32, Range<usize>)],
         cell: &Extent,
         depth: u32,
-        seen: &mut impl FnMut(u32, f64),
+        seen: &mut impl FnMut(u32, M),
     ) {
         if layers.len() <= MOST_UNORDERED {
             self.each_by_all(layers, points, surfaces, seen);
@@ -350,16 +354,16 @@ impl Cutter {
         }
         let before = points.len();
         for quarter in cell.quarters() {
-            let mut inside: Vec<Layer> = Vec::new();
+            let mut inside: Vec<Layer<M>> = Vec::new();
             for layer in &*layers {
                 let range = quarter.clip(points, layer.start as usize..layer.end as usize);
-                let area = signed_area(&points[range.clone()]);
-                if area > 0.0 {
+                let measure = M::of(&points[range.clone()]);
+                if measure.area() > 0.0 {
                     inside.push(Layer {
                         start: range.start as u32,
                         end: range.end as u32,
                         extent: Extent::of(&points[range]),
-                        area,
+                        measure,
                         ..*layer
                     });
                 }
@@ -382,9 +386,9 @@ impl Cutter {
 
 /// What of the polygon of `other` lies before the plane of `layer`: where the difference of their
 /// planes is positive.
-fn part_before(
-    other: &Layer,
-    layer: &Layer,
+fn part_before<M>(
+    other: &Layer<M>,
+    layer: &Layer<M>,
     difference: &Affine,
     polygon: &[DVec2],
     kept: &mut Vec<DVec2>,
@@ -478,7 +482,6 @@ struct Region {
     start: u32,
     end: u32,
     extent: Extent,
-    area: f64,
     transmittance: f64,
 }
 
@@ -497,16 +500,18 @@ impl Regions {
     }
 
     /// The integral of the transmittance.
-    fn total(&self) -> f64 {
-        let regions = self.regions.iter();
-        regions
-            .map(|region| region.area * region.transmittance)
-            .sum()
+    fn total<M: Measure>(&self) -> M {
+        let mut sum = M::default();
+        for region in &self.regions {
+            let corners = &self.points[region.start as usize..region.end as usize];
+            sum += M::of(corners) * region.transmittance;
+        }
+        sum
     }
 
     /// Puts a layer before all that follows, everywhere; returns the integral of the transmittance before
     /// it.
-    fn dim(&mut self, opacity: f64) -> f64 {
+    fn dim<M: Measure>(&mut self, opacity: f64) -> M {
         let total = self.total();
         for region in &mut self.regions {
             region.transmittance *= 1.0 - opacity;
@@ -517,7 +522,7 @@ impl Regions {
 
     /// Puts a layer before all that follows, in `polygon`; returns the integral over it of the
     /// transmittance before the layer.
-    fn cut(&mut self, polygon: &[DVec2], extent: &Extent, opacity: f64) -> f64 {
+    fn cut<M: Measure>(&mut self, polygon: &[DVec2], extent: &Extent, opacity: f64) -> M {
         let Self {
             regions,
             points,
@@ -530,7 +535,7 @@ impl Regions {
         *cut = true;
         next.clear();
         next_points.clear();
-        let mut seen = 0.0;
+        let mut seen = M::default();
         for region in &*regions {
             let corners = &points[region.start as usize..region.end as usize];
             if region.extent.and(extent).is_none() || separate(polygon, corners) {
@@ -549,7 +554,7 @@ impl Regions {
                 keep(rest, inside, kept);
                 std::mem::swap(rest, kept);
             }
-            seen += signed_area(rest).max(0.0) * region.transmittance;
+            seen += M::of(rest) * region.transmittance;
             let transmittance = region.transmittance * (1.0 - opacity);
             if transmittance > 0.0 {
                 push(next, next_points, rest, transmittance);
@@ -561,9 +566,9 @@ impl Regions {
     }
 
     /// The integral of the transmittance over a polygon.
-    fn through(&mut self, polygon: &[DVec2]) -> f64 {
+    fn through<M: Measure>(&mut self, polygon: &[DVec2]) -> M {
         if polygon.is_empty() {
-            return 0.0;
+            return M::default();
         }
         let Self {
             regions,
@@ -573,7 +578,7 @@ impl Regions {
             ..
         } = self;
         let extent = Extent::of(polygon);
-        let mut seen = 0.0;
+        let mut seen = M::default();
         for region in regions
             .iter()
             .filter(|region| region.extent.and(&extent).is_some())
@@ -584,22 +589,20 @@ impl Regions {
                 keep(rest, |p| inside_of(edge, p), kept);
                 std::mem::swap(rest, kept);
             }
-            seen += signed_area(rest).max(0.0) * region.transmittance;
+            seen += M::of(rest) * region.transmittance;
         }
         seen
     }
 }
 
 fn push(regions: &mut Vec<Region>, points: &mut Vec<DVec2>, polygon: &[DVec2], transmittance: f64) {
-    let area = signed_area(polygon);
-    if area > 0.0 {
+    if signed_area(polygon) > 0.0 {
         let start = points.len() as u32;
         points.extend_from_slice(polygon);
         regions.push(Region {
             start,
             end: points.len() as u32,
             extent: Extent::of(polygon),
-            area,
             transmittance,
         });
     }
@@ -676,7 +679,7 @@ mod tests {
                 face: FaceId(layers.len() as u32),
                 plane: Affine::new(plane(), plane(), random.unit()),
                 opacity: random.unit(),
-                area: signed_area(polygon),
+                measure: signed_area(polygon),
                 start: range.start as u32,
                 end: range.end as u32,
                 extent: Extent::of(polygon),
@@ -733,12 +736,12 @@ mod tests {
                         let range =
                             quarter.clip(&mut points, layer.start as usize..layer.end as usize);
                         (layer.start, layer.end) = (range.start as u32, range.end as u32);
-                        layer.area = signed_area(&points[range.clone()]);
-                        if layer.area > 0.0 {
+                        layer.measure = signed_area(&points[range.clone()]);
+                        if layer.measure > 0.0 {
                             layer.extent = Extent::of(&points[range]);
                         }
                     }
-                    inside.retain(|layer| layer.area > 0.0);
+                    inside.retain(|layer| layer.measure > 0.0);
                     let clipped = quarter.clip(&mut points, surfaces[0].1.clone());
                     let clipped = [(surfaces[0].0, clipped)];
                     cutter.each_by_all(&inside, &points, &clipped, &mut seen);

@@ -46,8 +46,9 @@ pub fn render_deep<E>(
     let height = frame.height as usize;
     let count = faces.len().div_ceil(FACES_PER_STRIP).clamp(1, height);
     let rows: Vec<usize> = (0..=count).map(|strip| strip * height / count).collect();
-    let border = |&row: &usize| row as f64 / height as f64;
-    let strips = Strips::new(&faces, rows.iter().map(border).collect());
+    let border = |row: usize| row as f64 / height as f64;
+    let extents = rows.windows(2).map(|rows| [rows[0], rows[1]].map(border));
+    let strips = Strips::new(&faces, extents.collect());
     let in_view = faces.ids().map(|face| material_of(scene, &faces, face));
     let textures = Textures::new(scene, &in_view.collect());
     for strip in 0..count {
@@ -61,6 +62,22 @@ pub fn render_deep<E>(
         write_rows(scene, &textures, &map, &grid, settings.unlit, &mut write)?;
     }
     Ok(())
+}
+
+/// Makes the deep picture of a map of `scene` on any grid of pixels; flat, it is that of
+/// [`render_window`](super::render_window). `write` gets its rows from the top, some at a time.
+///
+/// # Errors
+/// Whatever `write` fails with.
+pub fn deep_window<E>(
+    scene: &Scene,
+    map: &VisibilityMap,
+    grid: &PixelGrid,
+    unlit: bool,
+    mut write: impl FnMut(&DeepRows) -> Result<(), E>,
+) -> Result<(), E> {
+    let textures = Textures::new(scene, &materials_seen(scene, map));
+    write_rows(scene, &textures, map, grid, unlit, &mut write)
 }
 
 /// What a thread keeps from band to band.

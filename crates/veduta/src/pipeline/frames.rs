@@ -340,7 +340,7 @@ fn seen_of(
         let Range { start, end } = units[unit].objects;
         is_of[start as usize..end as usize].fill(true);
     }
-    scene.keep_objects(|object| is_of[object.index()]);
+    scene.keep_rows(&is_of);
     let map = find_visibility(scene, camera);
     let seen = SeenScene::of(scene, &map, size);
     (scene.objects, scene.layers) = (objects, layers);

@@ -12,7 +12,7 @@ use crate::scene::{Mesh, Object, Scene};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU8, AtomicU32, Ordering::Relaxed};
 use veduta_geometry::{DMat4, DVec3};
 use veduta_map::{FaceId, Faces};
 
@@ -66,11 +66,27 @@ impl PlaneGroups {
         let placed: Vec<PlacedMesh> = objects
             .map(|object| PlacedMesh::new(scene, object))
             .collect();
-        let extent = placed.iter().map(PlacedMesh::extent).fold(0.0, f64::max);
-        let slots = Slots {
-            distance: (extent * DISTANCE_SLOT).max(f64::MIN_POSITIVE),
-        };
+        let slots = Slots::for_meshes(&placed);
         let contested = contested_faces(&placed, &slots);
+        let pairs = pairs_among(&placed, &slots, &contested);
+        Self { pairs }
+    }
+
+    /// The same among some faces of several maps: `faces` ascend, each with the number of its map, and
+    /// `meshes` are those of the objects and where they stand in the world.
+    ///
+    /// Faces of one map know their planes already; those are mentioned only where a face of another map
+    /// may share them.
+    pub(crate) fn among_maps(meshes: &[(&Mesh, DMat4)], faces: &[(FaceIndex, u32)]) -> Self {
+        let meshes = meshes.iter();
+        let placed: Vec<PlacedMesh> = meshes
+            .map(|&(mesh, world_from_object)| PlacedMesh {
+                mesh,
+                world_from_object,
+            })
+            .collect();
+        let slots = Slots::for_meshes(&placed);
+        let contested = contested_by_maps(&placed, &slots, faces);
         let pairs = pairs_among(&placed, &slots, &contested);
         Self { pairs }
     }
@@ -155,6 +171,50 @@ fn contested_faces(placed: &[PlacedMesh], slots: &Slots) -> Vec<FaceIndex> {
         contested
     });
     contested.collect::<Vec<_>>().concat()
+}
+
+/// Of `faces`, those that are in a slot with one of another map, ascending; some by chance.
+fn contested_by_maps(
+    placed: &[PlacedMesh],
+    slots: &Slots,
+    faces: &[(FaceIndex, u32)],
+) -> Vec<FaceIndex> {
+    const NOBODY: u32 = u32::MAX;
+    const SEVERAL: u32 = u32::MAX - 1;
+    let claims: Vec<AtomicU32> = (0..(CLAIMS_PER_FACE * faces.len()).next_power_of_two())
+        .map(|_| AtomicU32::new(NOBODY))
+        .collect();
+    let last = claims.len() - 1;
+    // Of each face in turn, its number in `faces` and a claim on one of its slots.
+    let tasks = faces.par_chunks(FACES_PER_TASK as usize);
+    let claimed: Vec<Vec<(u32, u32)>> = tasks
+        .enumerate()
+        .map(|(task, faces)| {
+            let mut claimed = Vec::with_capacity(faces.len());
+            for (&((object, face), map), row) in faces.iter().zip(task as u32 * FACES_PER_TASK..) {
+                let Some(plane) = placed[object as usize].plane_of(face, slots) else {
+                    continue;
+                };
+                slots.of(&plane, |slot| {
+                    let claim = hash(&slot) as usize & last;
+                    claimed.push((row, claim as u32));
+                    let first = claims[claim].compare_exchange(NOBODY, map, Relaxed, Relaxed);
+                    if first.is_err_and(|before| before != map) {
+                        claims[claim].store(SEVERAL, Relaxed);
+                    }
+                });
+            }
+            claimed
+        })
+        .collect();
+    let mut contested: Vec<u32> = claimed
+        .iter()
+        .flatten()
+        .filter(|&&(_, claim)| claims[claim as usize].load(Relaxed) == SEVERAL)
+        .map(|&(row, _)| row)
+        .collect();
+    contested.dedup();
+    contested.iter().map(|&row| faces[row as usize].0).collect()
 }
 
 /// Pairs of a face and the first face of its plane among `faces`, for planes with more than one face;
@@ -369,6 +429,13 @@ struct Slots {
 }
 
 impl Slots {
+    fn for_meshes(placed: &[PlacedMesh]) -> Self {
+        let extent = placed.iter().map(PlacedMesh::extent).fold(0.0, f64::max);
+        Self {
+            distance: (extent * DISTANCE_SLOT).max(f64::MIN_POSITIVE),
+        }
+    }
+
     /// The slots that a plane may be in: more than one where it is near the border of slots.
     fn of(&self, plane: &Plane, mut visit: impl FnMut(Slot)) {
         let values = [
@@ -498,6 +565,36 @@ mod tests {
         assert_eq!(pairs(&with_decal).len(), 4);
         let twice = scene(&[(1, tilted(0.0)), (1, tilted(0.0))]);
         assert_eq!(pairs(&twice).len(), 4);
+    }
+
+    #[test]
+    fn among_maps_only_faces_of_different_ones_are_compared() {
+        let scene = scene(&[(2, tilted(0.0)), (3, tilted(0.0)), (2, tilted(1.0))]);
+        let objects = scene.objects.iter();
+        let meshes: Vec<(&Mesh, DMat4)> = objects
+            .map(|object| {
+                (
+                    &scene.meshes[object.mesh.0 as usize],
+                    object.world_from_object,
+                )
+            })
+            .collect();
+        let pairs_of = |map: fn(u32) -> u32| {
+            let faces: Vec<(FaceIndex, u32)> = (0..3)
+                .flat_map(|object| {
+                    let count = meshes[object as usize].0.face_count() as u32;
+                    (0..count).map(move |face| ((object, face), map(object)))
+                })
+                .collect();
+            PlaneGroups::among_maps(&meshes, &faces).pairs().to_vec()
+        };
+        assert_eq!(pairs_of(|_| 7), [], "of one map");
+        assert_eq!(pairs_of(|object| object % 2).len(), 8 + 18);
+        assert!(
+            pairs_of(|object| object)
+                .iter()
+                .all(|pair| pair.1 == (0, 0))
+        );
     }
 
     #[test]

@@ -184,6 +184,11 @@ impl<'a> Surfaces<'a> {
         Some(self.opacities[veil])
     }
 
+    /// Whether radiance differs from point to point of any fragment.
+    pub fn vary(&self) -> bool {
+        !self.varying.is_empty()
+    }
+
     /// Whether radiance differs from point to point of a fragment.
     #[inline(always)]
     pub fn varies(&self, fragment: u32) -> bool {

@@ -15,8 +15,8 @@ use veduta_map::{FaceId, Faces, PlaneId};
 /// Faces of the frame, sorted into horizontal strips of it.
 pub struct Strips<'a> {
     faces: &'a Faces,
-    /// Heights in the image plane between which the strips lie: from 0 to 1, ascending.
-    borders: Vec<f64>,
+    /// Top and bottom of each strip in the image plane.
+    extents: Vec<[f64; 2]>,
     touching: Buckets,
 }
 
@@ -29,18 +29,16 @@ pub struct Strip {
 }
 
 impl<'a> Strips<'a> {
-    /// Sorts `faces` into the strips between `borders`.
+    /// Sorts `faces` into strips with these tops and bottoms, which may overlap.
     ///
     /// # Panics
-    /// If `borders` do not ascend from 0 to 1.
-    pub fn new(faces: &'a Faces, borders: Vec<f64>) -> Self {
+    /// If a strip is empty, or its top or bottom lies above that of the strip before.
+    pub fn new(faces: &'a Faces, extents: Vec<[f64; 2]>) -> Self {
         assert!(
-            borders.first() == Some(&0.0)
-                && borders.last() == Some(&1.0)
-                && borders.is_sorted_by(|a, b| a < b),
-            "borders of strips ascend from 0 to 1"
+            extents.iter().all(|[top, bottom]| top < bottom)
+                && extents.is_sorted_by(|a, b| a[0] <= b[0] && a[1] <= b[1]),
+            "strips have a height, and come from above downwards"
         );
-        let inner = &borders[1..borders.len() - 1];
         let touched: Vec<Range<u32>> = (0..faces.len() as u32)
             .into_par_iter()
             .with_min_len(4096)
@@ -50,15 +48,15 @@ impl<'a> Strips<'a> {
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(t, b), y| {
                         (t.min(y), b.max(y))
                     });
-                let first = inner.partition_point(|&border| border <= top);
-                let last = inner.partition_point(|&border| border < bottom);
-                first as u32..last as u32 + 1
+                let first = extents.partition_point(|strip| strip[1] <= top);
+                let end = extents.partition_point(|strip| strip[0] < bottom);
+                first as u32..end as u32
             })
             .collect();
-        let touching = Buckets::new(borders.len() - 1, &touched);
+        let touching = Buckets::new(extents.len(), &touched);
         Self {
             faces,
-            borders,
+            extents,
             touching,
         }
     }
@@ -75,7 +73,7 @@ impl<'a> Strips<'a> {
 
     /// Top and bottom of a strip in the image plane.
     pub fn extent(&self, strip: usize) -> [f64; 2] {
-        [self.borders[strip], self.borders[strip + 1]]
+        self.extents[strip]
     }
 
     /// Cuts the faces of a strip.

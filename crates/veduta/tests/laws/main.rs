@@ -176,8 +176,9 @@ fn strips_show_what_the_frame_shows_there() {
 /// Finds what is seen in each of `count` strips, and puts the strips together again. Sides are not
 /// told: they would name lines of the strips' faces.
 fn strip_by_strip(faces: &Faces, count: u32) -> Seen {
-    let borders = (0..=count).map(|k| f64::from(k) / f64::from(count));
-    let strips = Strips::new(faces, borders.collect());
+    let border = |k: u32| f64::from(k) / f64::from(count);
+    let extents = (0..count).map(|k| [border(k), border(k + 1)]);
+    let strips = Strips::new(faces, extents.collect());
     let mut pieces: [Vec<(FaceId, Vec<DVec2>)>; 2] = Default::default();
     for index in 0..strips.len() {
         let Strip { faces, parts_of } = strips.cut(index);

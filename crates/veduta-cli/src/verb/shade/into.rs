@@ -3,7 +3,6 @@
 use super::{Shade, whole_size};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, counted, print};
-use crate::values::Names;
 use crate::verb::look::Development;
 use crate::verb::output::Target;
 use crate::verb::stored::{open, tell_work};
@@ -16,7 +15,7 @@ use veduta::dice::{PixelGrid, Region};
 use veduta::map::SeenScene;
 use veduta::pipeline;
 use veduta_geometry::DVec2;
-use veduta_io::{LoadedPicture, read_picture};
+use veduta_io::{LoadedPicture, ObjectNames, OpenMap, read_picture};
 
 /// A part of a picture that is there is made again.
 #[derive(Debug, Args)]
@@ -28,7 +27,7 @@ pub struct Into {
     pub into: Option<PathBuf>,
     /// The objects whose pixels are made again; names match with *, ** and ?. May be given several times
     #[arg(long, value_name = "NAME", requires = "into")]
-    objects: Vec<Names>,
+    objects: Vec<ObjectNames>,
     /// The map that the picture shows, where the objects have moved since: their pixels there are made
     /// again, too
     #[arg(long, value_name = "MAP", requires = "objects")]
@@ -52,8 +51,11 @@ impl Shade {
             let message = "--into needs the part that is made again: --window, --objects or both";
             return Err(usage(message));
         }
+        self.look
+            .refuse_filter("a filter reaches beyond the pixels that are made again")?;
         talk.begin("reading");
         let mut map = open(&self.map)?;
+        refuse_spans(&self.map, &map)?;
         let frame = self.frame(map.reader().size());
         let size = whole_size(frame)?;
         target.refuse_size(size)?;
@@ -157,6 +159,7 @@ impl Shade {
         }
         let was = was.as_ref().map(|path| -> Result<SeenScene, Failure> {
             let mut map = open(path)?;
+            refuse_spans(path, &map)?;
             let was = map.read(|reader| reader.read())?;
             if let Some(difference) = other_view(seen, &was) {
                 let message = format!("{}: {difference}", path.display());
@@ -191,6 +194,19 @@ impl Shade {
             None => region,
         })
     }
+}
+
+/// Refuses a map of spans, which have no exact pixels.
+fn refuse_spans(path: &Path, map: &OpenMap) -> Result<(), Failure> {
+    if map.reader().sub_scanlines_per_row().is_none() {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: holds spans on sub-scanlines; parts of pictures are made of regions, which veduta render \
+         finds without --sampling",
+        path.display()
+    );
+    Err(Failure::new(Code::Usage, message))
 }
 
 /// Why pixels of one map are not those of another, if they are not.

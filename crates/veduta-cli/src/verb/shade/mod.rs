@@ -3,8 +3,8 @@
 mod into;
 
 use super::look::Look;
-use super::output::Output;
-use super::stored::{Changes, open, tell_work};
+use super::output::{Output, Target};
+use super::stored::{Changes, Stored, open, tell_work};
 use super::vector::{Subject, Vector};
 use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
@@ -12,6 +12,7 @@ use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::Args;
 use into::Into;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use veduta::dice::PixelGrid;
 use veduta::drawing::LineKind;
@@ -37,6 +38,14 @@ pub struct Shade {
     /// Make only this part of it, in pixels of the whole picture; parts of pixels are fine
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::window, allow_hyphen_values = true)]
     window: Option<values::Window>,
+    /// Keep of each pixel all that is seen in it, each face with its depth and its object's id: a deep
+    /// .exr, which lays flat to the same picture
+    #[arg(
+        long,
+        requires = "output",
+        conflicts_with_all = ["preview", "background", "exposure", "tone", "aov"]
+    )]
+    deep: bool,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -64,6 +73,8 @@ Examples:
   Some objects anew, in a picture that is there:
       veduta shade town.veduta -o a.exr
       veduta shade town.veduta --unlit --into a.exr --objects wall -o b.exr
+  For deep compositing, all that is seen in each pixel:
+      veduta shade town.veduta -o town-deep.exr --deep
   With what was red in another colour:
       veduta shade town.veduta --set 'material.\"red\".color=#446' -o slate.png
 ";
@@ -77,6 +88,7 @@ impl Shade {
         }
         let vector = match self.output.vector_target(&self.map, json)? {
             Some(target) => {
+                self.look.refuse_filter("a vector picture has no pixels")?;
                 let settings = self.vector.drawing(target.format)?;
                 if settings.lines.contains(&LineKind::Boundary) {
                     let message = "a map holds the faces that are seen, so that it cannot tell which \
@@ -94,86 +106,160 @@ impl Shade {
             Some(_) => None,
             None => self.output.target(&self.map, json)?,
         };
+        let deep = match &pixels {
+            Some(target) if self.deep => {
+                let why = "a deep picture keeps what is seen in each pixel alone";
+                self.look.refuse_filter(why)?;
+                Some(self.output.deep_target(target)?)
+            }
+            _ => None,
+        };
         if vector.is_none() && pixels.is_none() {
             let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         }
         if let Some(old) = &self.local.into {
-            let Some(target) = &pixels else {
-                let message = "a vector picture is made as a whole; leave --into out";
-                return Err(Failure::new(Code::Usage, message));
+            let target = match &pixels {
+                Some(target) if !self.deep => target,
+                _ => {
+                    let message = "a vector or deep picture is made as a whole; leave --into out";
+                    return Err(Failure::new(Code::Usage, message));
+                }
             };
             return self.run_into(old, target, json, talk);
         }
+        if vector.is_some() && self.deep {
+            let message = "a deep picture is stored as .exr; leave --deep out";
+            return Err(Failure::new(Code::Usage, message));
+        }
         talk.begin("reading");
         let mut map = open(&self.map)?;
-        let frame = self.frame(map.reader().size());
-        let (left_top, size) = match self.window {
-            Some(window) => (window.left_top, window.size),
-            None => (DVec2::ZERO, whole_size(frame)?),
-        };
+        let grid = self.grid(map.reader().size())?;
         if let Some(target) = &pixels {
-            target.refuse_size(size)?;
+            let [width, height] = [grid.width, grid.height];
+            target.refuse_size(Size { width, height })?;
         }
-        let grid = PixelGrid {
-            width: size.width,
-            height: size.height,
-            pixels_per_frame: frame,
-            origin: left_top,
+        // A filter looks beyond the window.
+        let reached = match self.look.filter().kernel() {
+            Some(kernel) => grid.between_centres(kernel.radius(), 1),
+            None => grid,
         };
-        let corner = DVec2::new(size.width.into(), size.height.into());
-        let shown = [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels));
-        let mut seen = map.read(|reader| reader.read_window(shown))?;
+        let window = |grid: &PixelGrid| {
+            let corner = DVec2::new(grid.width.into(), grid.height.into());
+            [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels))
+        };
+        let mut seen = match map.reader().sub_scanlines_per_row() {
+            None => Stored::Regions(map.read(|reader| reader.read_window(window(&reached)))?),
+            Some(_) if vector.is_some() || self.deep => {
+                let message = format!(
+                    "{}: holds spans on sub-scanlines; vector and deep pictures are made of regions, \
+                     which veduta render finds without --sampling",
+                    self.map.display()
+                );
+                return Err(Failure::new(Code::Usage, message));
+            }
+            Some(_) => Stored::read(&mut map)?,
+        };
         let bytes_read = map.reader().bytes_read();
-        self.changes.apply(&mut seen.scene, self.strict, talk)?;
-        let development = self.look.development(&seen.scene, self.strict, talk)?;
-        let mut told = if let Some((target, settings)) = &vector {
-            let subject = Subject {
-                file: &self.map,
-                scene: &seen.scene,
-                map: &seen.map,
-                grid: &grid,
-                unlit: self.look.unlit,
-                strict: self.strict,
-            };
-            self.vector
-                .draw(target, settings, &subject, &development, talk)?
-        } else if let Some(target) = &pixels {
-            talk.begin("shading");
-            let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
-            tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
-            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
-            let (mut picture, aovs) =
-                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, aovs);
-            let layers = Layers {
-                aovs: &aovs,
-                scene: &seen.scene,
-                camera: &seen.map.camera,
-                grid,
-            };
-            tell_of_mattes(&self.map, &layers, self.strict, talk)?;
-            talk.begin("developing");
-            let ev = development.develop(&mut picture, !target.linear);
-            talk.begin("writing");
-            target.write(&picture, self.output.has_layers().then_some(&layers))?;
-            talk.end();
-            talk.detail(format_args!("exposure {ev:.2} EV"));
-            serde_json::json!({
-                "output": target.name(),
-                "size": [size.width, size.height],
-                "exposure": ev,
-            })
-        } else {
-            unreachable!("one of the two was asked for")
+        self.changes.apply(seen.scene_mut(), self.strict, talk)?;
+        let mut told = match (&seen, &vector, &deep, &pixels) {
+            (Stored::Regions(seen), Some((target, settings)), ..) => {
+                let development = self.look.development(&seen.scene, self.strict, talk)?;
+                let subject = Subject {
+                    file: &self.map,
+                    scene: &seen.scene,
+                    map: &seen.map,
+                    grid: &grid,
+                    unlit: self.look.unlit,
+                    strict: self.strict,
+                };
+                self.vector
+                    .draw(target, settings, &subject, &development, talk)?
+            }
+            (Stored::Regions(seen), _, Some(target), _) => {
+                let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
+                tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
+                talk.begin("shading");
+                let camera = seen.map.camera.with_window(window(&grid));
+                let size = [grid.width, grid.height];
+                let unlit = self.look.unlit;
+                let (samples, ()) = target.write(&seen.scene, camera, size, |sink| {
+                    let (scene, map) = (&seen.scene, &seen.map);
+                    pipeline::deep_window(scene, map, &grid, unlit, |rows| sink.write(rows))
+                })?;
+                talk.end();
+                talk.detail(format_args!("{samples} samples"));
+                json!({ "output": target.name(), "size": size, "samples": samples })
+            }
+            (_, _, _, Some(target)) => self.paint(target, &seen, &grid, talk)?,
+            _ => unreachable!("one of them was asked for"),
         };
         if json {
-            told["facesSeen"] = seen.map.faces.len().into();
+            told["facesSeen"] = seen.faces().len().into();
             told["bytesRead"] = bytes_read.into();
             told["warnings"] = talk.warnings().into();
             tell_work(&mut told);
             print(&format!("{told}\n"))?;
         }
         Ok(())
+    }
+
+    /// The pixels to make of a map whose picture has `size`.
+    fn grid(&self, of_map: [u32; 2]) -> Result<PixelGrid, Failure> {
+        let frame = self.frame(of_map);
+        let (origin, size) = match self.window {
+            Some(window) => (window.left_top, window.size),
+            None => (DVec2::ZERO, whole_size(frame)?),
+        };
+        Ok(PixelGrid {
+            width: size.width,
+            height: size.height,
+            pixels_per_frame: frame,
+            origin,
+        })
+    }
+
+    /// Makes a picture of pixels; what to tell of it.
+    fn paint(
+        &self,
+        target: &Target,
+        seen: &Stored,
+        grid: &PixelGrid,
+        talk: &mut Talk,
+    ) -> Result<Value, Failure> {
+        let scene = seen.scene();
+        let development = self.look.development(scene, self.strict, talk)?;
+        talk.begin("shading");
+        let shortcomings = seen.shortcomings();
+        tell_shortcomings(&self.map, scene, &shortcomings, self.strict, talk)?;
+        if matches!(seen, Stored::Spans(_)) {
+            self.look
+                .refuse_filter("filters weigh exact regions, not spans")?;
+        }
+        let (aovs, filter) = (self.output.aovs(), self.look.filter());
+        let picture = seen.picture(grid, self.look.unlit, filter, aovs);
+        let (mut picture, aovs) = picture.map_err(|error| {
+            let message = format!("{}: {error}", self.map.display());
+            Failure::new(Code::Usage, message)
+        })?;
+        let layers = Layers {
+            aovs: &aovs,
+            scene,
+            camera: seen.camera(),
+            grid: *grid,
+        };
+        tell_of_mattes(&self.map, &layers, self.strict, talk)?;
+        talk.begin("developing");
+        let ev = development.develop(&mut picture, !target.linear);
+        talk.begin("writing");
+        target.write(&picture, self.output.has_layers().then_some(&layers))?;
+        talk.end();
+        talk.detail(format_args!("exposure {ev:.2} EV"));
+        Ok(json!({
+            "output": target.name(),
+            "size": [grid.width, grid.height],
+            "exposure": ev,
+        }))
     }
 
     /// Width and height of the frame in pixels, with fractions.

@@ -204,6 +204,7 @@ pub fn read(
                 (problem, _) => ReadError { problem, ..error },
             })?
         };
+        inclusion.append_files(std::mem::take(&mut loaded.files));
         let charged = inclusion.charge_model(&layer.model, &loaded.scene);
         charged.map_err(here)?;
         warnings.append(std::mem::take(&mut loaded.warnings));

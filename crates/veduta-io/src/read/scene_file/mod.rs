@@ -28,7 +28,7 @@ use super::error::{Place, Problem, ReadError, Warning, Warnings};
 use super::moment::USUAL_FRAMES_PER_SECOND;
 use super::names::neighbour;
 use super::over_time::Models;
-use super::{Animation, Loaded, Moment, ReadOptions, files, finish};
+use super::{Animation, Loaded, Moment, ReadOptions, finish};
 use document::{Changes, Document};
 use form::{Form, Node};
 use inclusion::Inclusion;
@@ -65,18 +65,22 @@ pub(crate) fn read(
     inclusion
         .enter(path)
         .map_err(|problem| problem.at(Place::Whole).of(path))?;
-    read_included(path, options, &mut inclusion)
+    let loaded = read_included(path, options, &mut inclusion)?;
+    Ok(Loaded {
+        files: inclusion.finish(),
+        ..loaded
+    })
 }
 
-/// Reads a scene file that `inclusion` knows to be read.
+/// Reads a scene file that `inclusion` knows to be read; all its files are told to that.
 fn read_included(
     path: &Path,
     options: &ReadOptions,
     inclusion: &mut Inclusion<'_>,
 ) -> Result<Loaded, ReadError> {
     let whole = |problem: Problem| problem.at(Place::Whole).of(path);
-    let bytes = files::read_whole(path).map_err(|error| whole(Problem::Unreadable(error)))?;
-    inclusion.add_input(path, bytes.len());
+    let bytes = inclusion.read(path);
+    let bytes = bytes.map_err(|error| whole(Problem::Unreadable(error)))?;
     let source = Source::new(path, &bytes)?;
     let document: Document = read_form("a scene file", &source)?;
 
@@ -141,6 +145,7 @@ fn read_included(
     Ok(Loaded {
         scene,
         warnings: warnings.finish(),
+        files: Vec::new(),
         default_camera,
         picture_sizes,
         animations,

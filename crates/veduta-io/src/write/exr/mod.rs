@@ -15,6 +15,7 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{Blocks, Compression, Encoding, Image, Vec2, WritableImage, f16};
+use half::slice::HalfFloatSliceExt;
 use header::RecordHead;
 use std::io::{Seek, Write};
 use veduta::accumulate::Picture;
@@ -162,7 +163,11 @@ impl ChannelsWriter for &Channels<'_> {
             let at = line.location.position;
             let first = at.1 * self.width + at.0;
             let written = match &self.list[line.location.channel].values {
-                Values::F16(value) => line.write_samples(|k| half(value(first + k))),
+                Values::F16(value) => {
+                    let values = (first..first + line.location.sample_count).map(value);
+                    let halves = halves(&values.collect::<Vec<f32>>());
+                    line.write_samples(|k| halves[k])
+                }
                 Values::F32(value) => line.write_samples(|k| value(first + k)),
                 Values::U32(value) => line.write_samples(|k| value(first + k)),
             };
@@ -171,13 +176,18 @@ impl ChannelsWriter for &Channels<'_> {
     }
 }
 
-/// The nearest f16. What is too bright becomes the brightest there is: infinities would spread
-/// through every filter that follows.
-fn half(value: f32) -> f16 {
+/// The nearest f16 of each. What is too bright becomes the brightest there is: infinities would spread
+/// through every filter that follows. A line at a time, which is several times as quick as one by one.
+fn halves(values: &[f32]) -> Vec<f16> {
     let most = f16::MAX.to_f32();
-    f16::from_f32(if value.is_finite() {
-        value.clamp(-most, most)
-    } else {
-        value
-    })
+    let clamped: Vec<f32> = values
+        .iter()
+        .map(|&value| match value.is_finite() {
+            true => value.clamp(-most, most),
+            false => value,
+        })
+        .collect();
+    let mut halves = vec![f16::ZERO; clamped.len()];
+    halves.convert_from_f32_slice(&clamped);
+    halves
 }

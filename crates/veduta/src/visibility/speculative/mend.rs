@@ -91,7 +91,8 @@ fn take_away(
                 let mut pile = Pile::default();
                 let mut changed = Vec::new();
                 for &entry in entries {
-                    clipper.resume(entry.face, found.fragments(entry));
+                    let fragments = found.fragments(entry).map(|all| all.iter().copied());
+                    clipper.resume(entry.face, fragments);
                     let before = clipper.pieces.losses();
                     clipper.subtract_listed(entry.face, &[admitted], |cell| lowered.contains(cell));
                     if clipper.pieces.losses() != before {
