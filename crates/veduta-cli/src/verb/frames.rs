@@ -16,7 +16,7 @@ use veduta::dice::PixelGrid;
 use veduta::map::{Camera, Origin};
 use veduta::pipeline::{self, Extent, FrameStep, FrameWork};
 use veduta_io::{
-    Layers, Loaded, Moment, ReadOptions, SceneOverTime, VectorFormat, is_map, source_of, write_map,
+    Layers, Loaded, Moment, ReadOptions, SceneOverTime, VectorFormat, is_map, write_map,
 };
 
 /// Make the pictures of an animation
