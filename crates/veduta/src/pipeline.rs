@@ -1137,6 +1137,7 @@ mod tests {
         );
     }
 
+    #[test]
     fn a_material_made_transparent_after_its_map_was_found_is_named() {
         let opaque = scene_of(ground(2.0, 2), Material::default());
         let map = flat_map_of(&opaque, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));

@@ -7,7 +7,7 @@
 //!
 //! - [`merge`]: what is seen of several sets of faces -> what is seen of all of them. What is left of a
 //!   face in its own map is clipped by the seen faces of the *other* maps only: what is hidden in its
-//!   own map stays hidden.
+//!   own map stays hidden. Where no other map has anything, all stays as it is.
 //! - [`composite`]: the same for stored maps with what is seen of their scenes, which are united.
 //! - [`hold_out`]: less what is seen of maps that only hide.
 //! - [`composite_spans`]: as the paper does it, for what multiscan found.
