@@ -60,8 +60,8 @@ pub use object_names::ObjectNames;
     feature = "toml"
 ))]
 pub use read::{
-    Detail, ErrorKind, Excerpt, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES,
-    UpAxis, Warning, read_scene,
+    Animation, AnimationKind, Detail, ErrorKind, Excerpt, Loaded, Moment, Place, Problem,
+    ReadError, ReadOptions, SCENE_SUFFIXES, SceneOverTime, UpAxis, Warning, read_scene,
 };
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};

@@ -1,12 +1,16 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
-//! the light, `pipeline/deep.rs` for deep pictures and `pipeline/filtered.rs` for filters that reach beyond
-//! the pixel.
+//! the light, `pipeline/deep.rs` for deep pictures, `pipeline/filtered.rs` for filters that reach beyond
+//! the pixel, `pipeline/frames.rs` for animations and `pipeline/local.rs` for parts of pictures.
 
 mod aovs;
 mod deep;
 mod filtered;
+mod frames;
+mod local;
 
 pub use deep::{deep_window, render_deep};
+pub use frames::{Extent, FrameStep, FrameWork, Frames};
+pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer, VeilBuffers};

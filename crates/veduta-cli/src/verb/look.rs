@@ -140,15 +140,23 @@ impl Development {
     /// Only a lit picture for a display is exposed and toned unasked: linear formats are for further
     /// work, and unlit colours are to come through as they are.
     pub fn develop(&self, picture: &mut Picture, for_display: bool) -> f32 {
-        let unasked = for_display && !self.unlit;
-        let exposure = self.exposure.unwrap_or(if unasked {
+        let ev = tone::exposure_of(picture, self.exposure_asked(for_display));
+        self.develop_at(picture, ev, for_display);
+        ev
+    }
+
+    /// Whether the picture tells the exposure.
+    pub fn exposes_itself(&self, for_display: bool) -> bool {
+        self.exposure_asked(for_display) == Exposure::Auto
+    }
+
+    /// Only a lit picture for a display is exposed unasked.
+    fn exposure_asked(&self, for_display: bool) -> Exposure {
+        self.exposure.unwrap_or(if for_display && !self.unlit {
             Exposure::Auto
         } else {
             Exposure::Ev(0.0)
-        });
-        let ev = tone::exposure_of(picture, exposure);
-        self.develop_at(picture, ev, for_display);
-        ev
+        })
     }
 
     /// The colour behind a vector picture, if there is one.

@@ -61,7 +61,9 @@ impl Scene {
         self.keep_rows(&kept);
     }
 
-    fn keep_rows(&mut self, kept: &[bool]) {
+    /// Leaves out all objects but those whose row is `kept`. All else stays as it is, layers without
+    /// objects too.
+    pub fn keep_rows(&mut self, kept: &[bool]) {
         // How many stay before each object.
         let mut before = vec![0; kept.len() + 1];
         for (index, &is_kept) in kept.iter().enumerate() {

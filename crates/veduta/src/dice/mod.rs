@@ -20,7 +20,7 @@
 //!
 //! [`dice_spans`] does the same for what multiscan found. [`sum_by_face`] tells which faces a pixel
 //! shows, for all that is not light. [`coverage`] gives the areas in f64, for measuring; [`Depths`] how
-//! deep parts reach, for deep pictures.
+//! deep parts reach, for deep pictures. [`Region`] are the pixels that are made where only some are.
 
 mod bands;
 mod coverage;
@@ -28,6 +28,7 @@ mod depth;
 mod measure;
 mod pixel_grid;
 mod place;
+mod region;
 mod shares;
 mod spans;
 mod veils;
@@ -37,6 +38,7 @@ pub use coverage::{Coverage, coverage};
 pub use depth::{DepthRange, Depths, depth_of_nearness};
 pub use measure::{CellParts, Diced, Measure};
 pub use pixel_grid::PixelGrid;
+pub use region::Region;
 pub use shares::{Share, largest, sum_by_face};
 pub use spans::{SpanDicer, dice_spans};
 pub use veils::{VeilBuffers, attenuate};

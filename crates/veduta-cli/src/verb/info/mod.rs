@@ -1,5 +1,6 @@
 //! `veduta info`: what a model or a picture holds, and what a camera sees at a point of a picture.
 
+mod animations;
 mod lights;
 mod model;
 mod pick;
@@ -7,7 +8,7 @@ mod tree;
 
 use super::render::View;
 use super::stored::Stored;
-use super::{is_picture, load};
+use super::{When, is_picture, load};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, plain, print};
 use crate::values::Size;
@@ -47,6 +48,8 @@ pub struct Info {
     size: Option<Size>,
     #[command(flatten)]
     view: View,
+    #[command(flatten)]
+    when: When,
 }
 
 const EXAMPLES: &str = "\
@@ -85,10 +88,15 @@ impl Info {
 
     /// JSON and text.
     fn model(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
-        let loaded = load(&self.file, &self.view.reading, self.strict, talk)?;
+        let options = self.when.options(&self.view.reading);
+        let loaded = load(&self.file, &options, self.strict, talk)?;
         let Some(spot) = self.pick else {
             let scene = &loaded.scene;
-            return Ok((model::as_json(scene), model::as_text(scene, self.all)));
+            let mut told = model::as_json(scene);
+            told["animations"] = animations::as_json(&loaded);
+            told["framesPerSecond"] = loaded.frames_per_second.into();
+            let text = model::as_text(scene, self.all) + &animations::as_text(&loaded);
+            return Ok((told, text));
         };
         let (camera, size) = self.view.camera(&self.file, &loaded, self.size)?;
         talk.begin("finding visibility");

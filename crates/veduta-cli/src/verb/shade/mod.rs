@@ -1,5 +1,7 @@
 //! `veduta shade`: pixels of a stored map, at any scale and in other colours.
 
+mod into;
+
 use super::look::Look;
 use super::output::{Output, Target};
 use super::stored::{Changes, Stored, open, tell_work};
@@ -9,6 +11,7 @@ use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::Args;
+use into::Into;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use veduta::dice::PixelGrid;
@@ -48,6 +51,8 @@ pub struct Shade {
     strict: bool,
 
     #[command(flatten)]
+    local: Into,
+    #[command(flatten)]
     changes: Changes,
     #[command(flatten)]
     output: Output,
@@ -65,6 +70,9 @@ Examples:
       veduta shade town.veduta --scale 4 -o large.png
   A part of it, as through a magnifying glass:
       veduta shade town.veduta --scale 9 --window 3000,2000,320,240 -o part.png
+  Some objects anew, in a picture that is there:
+      veduta shade town.veduta -o a.exr
+      veduta shade town.veduta --unlit --into a.exr --objects wall -o b.exr
   For deep compositing, all that is seen in each pixel:
       veduta shade town.veduta -o town-deep.exr --deep
   With what was red in another colour:
@@ -114,6 +122,16 @@ impl Shade {
         if vector.is_none() && pixels.is_none() {
             let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
+        }
+        if let Some(old) = &self.local.into {
+            let target = match &pixels {
+                Some(target) if !self.deep => target,
+                _ => {
+                    let message = "a vector or deep picture is made as a whole; leave --into out";
+                    return Err(Failure::new(Code::Usage, message));
+                }
+            };
+            return self.run_into(old, target, json, talk);
         }
         if vector.is_some() && self.deep {
             let message = "a deep picture is stored as .exr; leave --deep out";
@@ -192,19 +210,11 @@ impl Shade {
     }
 
     /// The pixels to make of a map whose picture has `size`.
-    fn grid(&self, [width, height]: [u32; 2]) -> Result<PixelGrid, Failure> {
-        let frame = match self.size {
-            Some(size) => DVec2::new(size.width.into(), size.height.into()),
-            None => DVec2::new(width.into(), height.into()) * self.scale.unwrap_or(DVec2::ONE),
-        };
+    fn grid(&self, of_map: [u32; 2]) -> Result<PixelGrid, Failure> {
+        let frame = self.frame(of_map);
         let (origin, size) = match self.window {
             Some(window) => (window.left_top, window.size),
-            None => {
-                let pixels = frame.round().max(DVec2::ONE);
-                let size = Size::new(pixels.x as u64, pixels.y as u64);
-                let size = size.map_err(|problem| Failure::new(Code::Usage, problem))?;
-                (DVec2::ZERO, size)
-            }
+            None => (DVec2::ZERO, whole_size(frame)?),
         };
         Ok(PixelGrid {
             width: size.width,
@@ -256,4 +266,20 @@ impl Shade {
             "exposure": ev,
         }))
     }
+
+    /// Width and height of the frame in pixels, with fractions.
+    fn frame(&self, of_map: [u32; 2]) -> DVec2 {
+        let [width, height] = of_map.map(f64::from);
+        match self.size {
+            Some(size) => DVec2::new(size.width.into(), size.height.into()),
+            None => DVec2::new(width, height) * self.scale.unwrap_or(DVec2::ONE),
+        }
+    }
+}
+
+/// The size of a picture that shows all of a frame.
+fn whole_size(frame: DVec2) -> Result<Size, Failure> {
+    let pixels = frame.round().max(DVec2::ONE);
+    let size = Size::new(pixels.x as u64, pixels.y as u64);
+    size.map_err(|problem| Failure::new(Code::Usage, problem))
 }
