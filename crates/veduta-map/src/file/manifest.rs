@@ -1,8 +1,8 @@
 //! `manifest.json`: what is in a file and where, written last.
 
 use super::FileError;
-use crate::Camera;
 use crate::scene::{Layer, Light, Material, World};
+use crate::{Camera, GuestGrid, GuestKind};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{self, Read};
@@ -15,7 +15,7 @@ pub const MANIFEST: &str = "manifest.json";
 pub const FORMAT: &str = "veduta visibility map";
 
 /// Major version: readers refuse others. Minor version: readers skip what they do not know.
-pub const VERSION: [u32; 2] = [1, 0];
+pub const VERSION: [u32; 2] = [1, 1];
 
 /// The manifest. Fields that a reader does not know are skipped.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,17 +27,34 @@ pub struct Manifest {
     pub generator: String,
     /// Pixels of the picture it was made for; a map has no resolution.
     pub size: [u32; 2],
+    /// Whether something was cut or left out, so that a face may be unseen where nothing hides it; since
+    /// version 1.1.
+    #[serde(default)]
+    pub has_holes: bool,
     pub camera: Camera,
     pub world: World,
     pub layers: Vec<Layer>,
     pub lights: Vec<Light>,
     pub materials: Vec<Material>,
     pub sources: Vec<Source>,
+    /// Pictures of other programs; since version 1.1.
+    #[serde(default)]
+    pub guests: Vec<GuestEntry>,
     /// Boxes around what the tiles' faces show: left, top, right, bottom, in the image plane. Tile `i`
     /// is batch `i` of the members that are cut into tiles.
     pub tiles: Vec<[f64; 4]>,
     /// Of each member that holds a table, by name.
     pub tables: BTreeMap<String, Table>,
+}
+
+/// What the tables do not tell of a guest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GuestEntry {
+    pub name: String,
+    pub kind: GuestKind,
+    pub grid: GuestGrid,
+    /// Names of what its samples belong to.
+    pub objects: Vec<String>,
 }
 
 /// A file that the scene was read from.

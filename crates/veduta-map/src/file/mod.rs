@@ -3,7 +3,7 @@
 //! A file is a ZIP archive whose members are stored as they are: Arrow IPC files, each a table, and
 //! `manifest.json`, written last. docs/format.md tells the columns and how to read them from Python.
 //!
-//! - `tables` are the columns; `tiles` says which rows stand together, so that a window of the picture
+//! - `tables` are the columns, `guests` those of pictures of other programs; `tiles` says which rows stand together, so that a window of the picture
 //!   reads little; `container` is the archive, `manifest` what else there is to know.
 //! - Every byte is under a checksum, or is compared with its only legal value, before it is decoded:
 //!   damage is an error that says where, never another picture.
@@ -13,6 +13,7 @@
 //! holds more than the map itself and a tile of the file.
 
 mod container;
+mod guests;
 mod manifest;
 mod read;
 mod tables;

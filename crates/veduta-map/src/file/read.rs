@@ -2,11 +2,13 @@
 
 use super::FileError;
 use super::container::{ArchiveReader, Member};
+use super::guests;
 use super::manifest::{MANIFEST, Manifest, Segment, Source, Table};
 use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
 use crate::scene::{Mesh, MeshId, Object, Scene};
 use crate::{
-    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, SeenScene, Side, VisibilityMap,
+    Camera, FaceId, Faces, Fragments, Guest, GuestSamples, MaterialId, ObjectId, PlaneId,
+    SeenScene, Side, VisibilityMap,
 };
 use arrow_array::RecordBatch;
 use arrow_ipc::reader::FileDecoder;
@@ -58,7 +60,7 @@ impl<R: Read + Seek> MapReader<R> {
                 return unsound(format!("the parts of {} are not all of it", member.name));
             }
         }
-        for table in TableName::ALL {
+        for table in self.tables() {
             let name = table.member();
             let (Some(_), Some(found)) =
                 (self.archive.member(name), self.manifest.tables.get(name))
@@ -69,11 +71,28 @@ impl<R: Read + Seek> MapReader<R> {
             if of_tiles && found.batches.len() != self.manifest.tiles.len() {
                 return unsound(format!("{name} does not have a batch for each tile"));
             }
+            let of_guests = TableName::OF_GUESTS.contains(&table);
+            let bands = self
+                .manifest
+                .guests
+                .iter()
+                .map(|guest| guests::band_count(&guest.grid));
+            if of_guests && found.batches.len() as u64 != bands.sum::<u64>() {
+                return unsound(format!("{name} does not have a batch for each band"));
+            }
         }
         if self.manifest.size.contains(&0) {
             return unsound("the picture has no pixels".into());
         }
         Ok(())
+    }
+
+    /// The tables that must be there.
+    fn tables(&self) -> impl Iterator<Item = TableName> + use<R> {
+        let of_guests = (!self.manifest.guests.is_empty()).then_some(TableName::OF_GUESTS);
+        TableName::ALL
+            .into_iter()
+            .chain(of_guests.into_iter().flatten())
     }
 
     /// Pixels of the picture that the map was made for.
@@ -96,6 +115,12 @@ impl<R: Read + Seek> MapReader<R> {
         &self.manifest.sources
     }
 
+    /// What is in the file and where.
+    #[cfg(test)]
+    pub(super) fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
     /// Bytes read so far.
     pub fn bytes_read(&self) -> u64 {
         self.archive.bytes_read()
@@ -106,7 +131,10 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`].
     pub fn read(&mut self) -> Result<SeenScene, FileError> {
-        self.read_tiles(0..self.manifest.tiles.len())
+        self.read_tiles(
+            0..self.manifest.tiles.len(),
+            [f64::NEG_INFINITY, f64::INFINITY],
+        )
     }
 
     /// Reads what is seen in a window of the image plane, from its left top corner to its right bottom
@@ -121,9 +149,14 @@ impl<R: Read + Seek> MapReader<R> {
         let tiles: Vec<usize> = (0..self.manifest.tiles.len())
             .filter(|&tile| touches(&self.manifest.tiles[tile]))
             .collect();
-        let seen = self.read_tiles(tiles.into_iter())?;
-        // Objects and materials of which nothing was read are left out.
-        Ok(SeenScene::of(&seen.scene, &seen.map, seen.size))
+        let seen = self.read_tiles(tiles.into_iter(), [min.y, max.y])?;
+        // Objects and materials of which nothing was read are left out. In the window the map has the
+        // holes that the whole has.
+        Ok(SeenScene {
+            has_holes: seen.has_holes,
+            guests: seen.guests,
+            ..SeenScene::of(&seen.scene, &seen.map, seen.size)
+        })
     }
 
     /// Reads every byte and checks the invariants of what is read.
@@ -134,7 +167,7 @@ impl<R: Read + Seek> MapReader<R> {
         for member in self.archive.members().to_vec() {
             self.archive.check(&member)?;
         }
-        for table in TableName::ALL {
+        for table in self.tables() {
             let (_, member, found) = self.table(table)?;
             let (start, head) = (member.start(), found.head.clone());
             self.segment(table, start, &head)?;
@@ -145,7 +178,12 @@ impl<R: Read + Seek> MapReader<R> {
         Ok(seen)
     }
 
-    fn read_tiles(&mut self, tiles: impl Iterator<Item = usize>) -> Result<SeenScene, FileError> {
+    /// Reads tiles, and guests between two heights of the image plane.
+    fn read_tiles(
+        &mut self,
+        tiles: impl Iterator<Item = usize>,
+        heights: [f64; 2],
+    ) -> Result<SeenScene, FileError> {
         let mut rows = SeenRows::default();
         let mut of_tiles = Vec::new();
         for table in TableName::OF_TILES {
@@ -191,7 +229,48 @@ impl<R: Read + Seek> MapReader<R> {
             Ok(())
         })?;
         check_scene(&scene)?;
-        rows.into_seen(scene, &self.manifest)
+        let guests = self.read_guests(heights)?;
+        Ok(SeenScene {
+            guests,
+            ..rows.into_seen(scene, &self.manifest)?
+        })
+    }
+
+    /// Reads the bands of guests between two heights of the image plane. Guests of which that is nothing
+    /// are left out.
+    fn read_guests(&mut self, heights: [f64; 2]) -> Result<Vec<Guest>, FileError> {
+        let entries = self.manifest.guests.clone();
+        if entries.is_empty() {
+            return Ok(Vec::new());
+        }
+        let [of_pixels, of_samples] = [
+            TableReader::new(self, TableName::GuestPixels)?,
+            TableReader::new(self, TableName::GuestSamples)?,
+        ];
+        let mut guests = Vec::new();
+        let mut first_band = 0;
+        for entry in entries {
+            let bands = guests::band_count(&entry.grid) as usize;
+            if let Some((rows, of_guest)) = guests::bands_between(&entry.grid, heights) {
+                let mut samples = GuestSamples::default();
+                for band in of_guest {
+                    let index = first_band + band;
+                    let batches = [
+                        of_pixels.batch(self, index)?,
+                        of_samples.batch(self, index)?,
+                    ];
+                    let rows = [0, 1].map(|table| Rows {
+                        batch: &batches[table],
+                        member: TableName::OF_GUESTS[table].member(),
+                        index,
+                    });
+                    guests::add_band(&mut samples, &entry.grid, band, &rows)?;
+                }
+                guests.push(guests::guest(entry, rows, samples)?);
+            }
+            first_band += bands;
+        }
+        Ok(guests)
     }
 
     fn read_all(
@@ -401,6 +480,8 @@ impl SeenRows {
             },
             scene,
             size: manifest.size,
+            has_holes: manifest.has_holes,
+            guests: Vec::new(),
         })
     }
 

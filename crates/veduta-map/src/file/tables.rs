@@ -33,15 +33,25 @@ pub enum TableName {
     Objects,
     /// Pictures, each a batch.
     Images,
+    /// How many samples the pixels of guests have, by band; only in files with guests.
+    GuestPixels,
+    /// Samples of guests, by band; only in files with guests.
+    GuestSamples,
 }
 
-use TableName::{Faces, Images, Objects, Opaque, Points, Veils, Vertices};
+use TableName::{
+    Faces, GuestPixels, GuestSamples, Images, Objects, Opaque, Points, Veils, Vertices,
+};
 
 impl TableName {
     /// Tables whose batches are tiles, in the order in which they stand in a file.
     pub const OF_TILES: [Self; 5] = [Points, Vertices, Faces, Opaque, Veils];
 
+    /// Tables that each file has.
     pub const ALL: [Self; 7] = [Points, Vertices, Faces, Opaque, Veils, Objects, Images];
+
+    /// Tables whose batches are bands of guests.
+    pub const OF_GUESTS: [Self; 2] = [GuestPixels, GuestSamples];
 
     /// Name of the member.
     pub fn member(self) -> &'static str {
@@ -53,6 +63,8 @@ impl TableName {
             Veils => "veils.arrow",
             Objects => "objects.arrow",
             Images => "images.arrow",
+            GuestPixels => "guest_pixels.arrow",
+            GuestSamples => "guest_samples.arrow",
         }
     }
 
@@ -97,11 +109,19 @@ impl TableName {
                 number("height"),
                 Field::new("rgba", DataType::LargeBinary, false),
             ],
+            GuestPixels => vec![number("samples")],
+            GuestSamples => {
+                let full = |name: &str| Field::new(name, DataType::Float32, false);
+                let mut fields = vec![real("near"), real("far")];
+                fields.extend(["opacity", "r", "g", "b"].map(full));
+                fields.push(number("object"));
+                fields
+            }
         };
         Schema::new(fields)
     }
 
-    fn batch(self, columns: Vec<ArrayRef>) -> RecordBatch {
+    pub(super) fn batch(self, columns: Vec<ArrayRef>) -> RecordBatch {
         RecordBatch::try_new(Arc::new(self.schema()), columns)
             .expect("columns are as the schema says")
     }
@@ -369,16 +389,22 @@ impl Rows<'_> {
         Ok(column)
     }
 
-    fn numbers(&self, name: &str) -> Result<&[u32], FileError> {
+    pub fn numbers(&self, name: &str) -> Result<&[u32], FileError> {
         let column = self.full(name, |column| column.as_primitive_opt::<UInt32Type>())?;
         Ok(column.values())
     }
 
-    fn reals(&self, name: &str) -> Result<&[f64], FileError> {
+    pub fn reals(&self, name: &str) -> Result<&[f64], FileError> {
         let column = self.full(name, |column| column.as_primitive_opt::<Float64Type>())?;
         if column.values().iter().any(|value| !value.is_finite()) {
             return Err(self.unsound(format_args!("a number in `{name}` is not finite")));
         }
+        Ok(column.values())
+    }
+
+    /// Numbers of single precision.
+    pub fn floats(&self, name: &str) -> Result<&[f32], FileError> {
+        let column = self.full(name, |column| column.as_primitive_opt::<Float32Type>())?;
         Ok(column.values())
     }
 

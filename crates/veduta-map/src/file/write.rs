@@ -2,6 +2,7 @@
 
 use super::FileError;
 use super::container::ArchiveWriter;
+use super::guests;
 use super::manifest::{FORMAT, MANIFEST, Manifest, Segment, Source, Table, VERSION};
 use super::tables::{TableName, TileBatches, image_row, object_rows};
 use super::tiles::tiles;
@@ -52,18 +53,29 @@ pub fn write_map<W: Write + Seek>(
     let objects = scene.objects.chunks(OBJECTS_PER_BATCH);
     write(TableName::Objects, &mut objects.map(object_rows))?;
     write(TableName::Images, &mut scene.images.iter().map(image_row))?;
+    if !seen.guests.is_empty() {
+        for table in TableName::OF_GUESTS {
+            let bands = seen.guests.iter().flat_map(|guest| {
+                let bands = guests::bands(guest.grid());
+                bands.map(move |rows| guests::batch(table, guest, rows))
+            });
+            write(table, &mut { bands })?;
+        }
+    }
 
     let manifest = Manifest {
         format: FORMAT.into(),
         version: VERSION,
         generator: concat!("veduta ", env!("CARGO_PKG_VERSION")).into(),
         size: seen.size,
+        has_holes: seen.has_holes,
         camera: map.camera,
         world: scene.world.clone(),
         layers: scene.layers.clone(),
         lights: scene.lights.clone(),
         materials: scene.materials.clone(),
         sources: sources.to_vec(),
+        guests: seen.guests.iter().map(guests::entry).collect(),
         tiles: tiles.iter().map(|tile| tile.bounds).collect(),
         tables,
     };
