@@ -8,14 +8,26 @@
 //! - [`merge`]: what is seen of several sets of faces -> what is seen of all of them. What is left of a
 //!   face in its own map is clipped by the seen faces of the *other* maps only: what is hidden in its
 //!   own map stays hidden.
-//! - [`composite`]: the same for stored maps with what is seen of their scenes, which are united.
-//! - [`hold_out`]: less what is seen of maps that only hide.
+//! - [`cover`]: what is seen inside or outside the region that faces cover, whatever the depth.
+//! - [`composite`] and [`hold_out`]: the first for stored maps with what is seen of their scenes, which
+//!   are united.
+//! - [`operate`] and [`lay_on`]: the second for these: the operators of Porter & Duff (1984), "Compositing
+//!   digital images", by exact area, and what lies behind everything.
+//! - [`see_through`]: a map as if another camera had seen it.
 //!
-//! Coplanar faces of different maps are decided by the order of their faces: priority of the layer,
-//! name of the object, face; whatever the order of the maps.
+//! Maps that something was cut out of go through `pieced` first. Coplanar faces of different maps are
+//! decided by the order of their faces: priority of the layer, name of the object, face; whatever the
+//! order of the maps.
 
+mod camera;
+mod cover;
 mod merge;
+mod operators;
+mod pieced;
 mod unite;
 
+pub use camera::{CameraMismatch, see_through};
+pub use cover::{Keep, cover};
 pub use merge::merge;
+pub use operators::{Operator, lay_on, operate};
 pub use unite::{CompositeError, composite, hold_out};
