@@ -11,6 +11,8 @@
 pub mod deep_exr;
 #[cfg(feature = "exr")]
 pub mod depth_picture;
+#[cfg(feature = "exr")]
+mod guest;
 mod map_file;
 #[cfg(any(
     feature = "gltf",
@@ -27,6 +29,8 @@ mod scale;
 pub mod tone;
 mod write;
 
+#[cfg(feature = "exr")]
+pub use guest::{GuestOptions, GuestProblem, LoadedGuest, read_guest};
 pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, source_of, write_map};
 #[cfg(any(
     feature = "gltf",
