@@ -2,7 +2,7 @@
 
 use super::look::Look;
 use super::output::Output;
-use super::stored::{Changes, open, tell_work};
+use super::stored::{Changes, Trust, laid_on, open, refuse_filter_of_guests, tell_work};
 use super::vector::{Subject, Vector};
 use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
@@ -39,6 +39,8 @@ pub struct Shade {
     strict: bool,
 
     #[command(flatten)]
+    trust: Trust,
+    #[command(flatten)]
     changes: Changes,
     #[command(flatten)]
     output: Output,
@@ -56,6 +58,10 @@ Examples:
       veduta shade town.veduta --scale 4 -o large.png
   A part of it, as through a magnifying glass:
       veduta shade town.veduta --scale 9 --window 3000,2000,320,240 -o part.png
+  Before what another map shows, however near that is:
+      veduta render hut.obj --eye 9,-9,5 --look-at 0,0,0 -o far.veduta
+      veduta render town.obj --eye 9,-9,5 --look-at 0,0,0 -o near.veduta
+      veduta shade near.veduta --background far.veduta -o before.png
   With what was red in another colour:
       veduta shade town.veduta --set 'material.\"red\".color=#446' -o slate.png
 ";
@@ -124,11 +130,21 @@ impl Shade {
         };
         let corner = DVec2::new(reached.width.into(), reached.height.into());
         let shown = [DVec2::ZERO, corner].map(|pixels| reached.image_from_pixels(pixels));
-        let mut seen = map.read(|reader| reader.read_window(shown))?;
+        let seen = map.read(|reader| reader.read_window(shown))?;
         let bytes_read = map.reader().bytes_read();
+        let mut seen = laid_on(seen, &self.look, self.trust, |reader| {
+            reader.read_window(shown)
+        })?;
         self.changes.apply(&mut seen.scene, self.strict, talk)?;
         let development = self.look.development(&seen.scene, self.strict, talk)?;
         let mut told = if let Some((target, settings)) = &vector {
+            if !seen.guests.is_empty() {
+                let message = format!(
+                    "{}: holds pictures of other programs, which have no shapes: make a picture of pixels",
+                    self.map.display()
+                );
+                return Err(Failure::new(Code::Unsupported, message));
+            }
             let subject = Subject {
                 file: &self.map,
                 scene: &seen.scene,
@@ -144,8 +160,8 @@ impl Shade {
             let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
             tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
             let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
-            let (mut picture, aovs) =
-                pipeline::render_channels(&seen.scene, &seen.map, &grid, unlit, filter, aovs);
+            refuse_filter_of_guests(&self.map, &seen, &self.look)?;
+            let (mut picture, aovs) = pipeline::render_seen(&seen, &grid, unlit, filter, aovs);
             let layers = Layers {
                 aovs: &aovs,
                 scene: &seen.scene,

@@ -5,6 +5,7 @@ mod model;
 mod pick;
 mod tree;
 
+use super::guests::kind_name;
 use super::render::View;
 use super::{is_picture, load};
 use crate::exit::{Code, Failure};
@@ -150,6 +151,17 @@ fn map_told<R: Read + Seek>(seen: &SeenScene, file: &MapReader<R>, all: bool) ->
     told["camera"] = model::camera_as_json("", &seen.map.camera);
     told["sources"] = json!(sources);
     told["generator"] = file.generator().into();
+    told["hasHoles"] = seen.has_holes.into();
+    let guests = seen.guests.iter().map(|guest| {
+        let samples = guest.samples().len();
+        json!({
+            "name": guest.name(),
+            "kind": guest.kind(),
+            "size": guest.grid().size,
+            "samples": samples,
+        })
+    });
+    told["guests"] = guests.collect();
     let mut text = format!(
         "  a map of  {width} x {height} pixels, by {}\n  seen      {} faces in {} fragments, {} veils\n",
         plain(file.generator()),
@@ -159,6 +171,12 @@ fn map_told<R: Read + Seek>(seen: &SeenScene, file: &MapReader<R>, all: bool) ->
     );
     for source in sources {
         text += &format!("  made of   {}\n", plain(source));
+    }
+    for guest in &seen.guests {
+        let (name, [width, height]) = (plain(guest.name()), guest.grid().size);
+        let (kind, samples) = (kind_name(guest.kind()), guest.samples().len());
+        text +=
+            &format!("  guest     {name}: {kind}, {width} x {height} pixels, {samples} samples\n");
     }
     text += &model::as_text(&seen.scene, all);
     (told, text)
