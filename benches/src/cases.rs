@@ -166,7 +166,7 @@ mod tests {
             let case = Case::parse(title).expect("a sound title");
             let exact = case.picture_exactly(&mut case.empty_map());
             let spans = multiscan::find_spans(&case.faces, case.width, case.height, 128);
-            let scanned = spans.picture(|face| case.color(face));
+            let scanned = multiscan::picture(&spans, |face| case.color(face));
             let mut buffer = ZBuffer::new(32 * case.width, 32 * case.height);
             buffer.find(&case.faces);
             let mut sampled = case.empty_picture();

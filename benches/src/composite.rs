@@ -7,8 +7,8 @@ use std::io::Cursor;
 use veduta::composite::composite;
 use veduta::dice::PixelGrid;
 use veduta::geometry::DVec2;
-use veduta::map::SeenScene;
 use veduta::map::file::{MapReader, write_map};
+use veduta::map::{Origin, SeenScene};
 use veduta::pipeline::{find_visibility, render_window};
 use veduta::scene::{MeshId, Scene};
 
@@ -130,7 +130,7 @@ fn worst_window(seen: &SeenScene, bytes: &[u8]) -> [f64; 2] {
 }
 
 fn written(seen: &SeenScene) -> Vec<u8> {
-    let out = write_map(Cursor::new(Vec::new()), seen, &[]);
+    let out = write_map(Cursor::new(Vec::new()), seen, &Origin::default());
     out.expect("memory takes all").into_inner()
 }
 

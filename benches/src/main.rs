@@ -392,7 +392,7 @@ fn exact_picture(case: &Case, map: &mut VisibilityMap) {
 
 fn multiscan_picture(case: &Case, n: u32) {
     let spans = multiscan::find_spans(&case.faces, case.width, case.height, n);
-    black_box(spans.picture(|face| case.color(face)));
+    black_box(multiscan::picture(&spans, |face| case.color(face)));
 }
 
 /// A z-buffer with `n` x `n` samples for each pixel, and the picture made of it.

@@ -6,7 +6,8 @@ use std::io::{self, IsTerminal};
 use veduta::map::file::FileError;
 use veduta_io::deep_exr::DeepProblem;
 use veduta_io::{
-    ErrorKind, MapFileError, PictureProblem, ReadError, ReadPictureError, WriteError, WriteProblem,
+    CastersError, ErrorKind, MapFileError, PictureProblem, ReadError, ReadPictureError, WriteError,
+    WriteProblem,
 };
 
 /// Exit codes. `0` is success, `130` an interrupt.
@@ -84,6 +85,18 @@ impl From<MapFileError> for Failure {
             FileError::Io { .. } => Code::InputOutput,
             FileError::Version { .. } => Code::Unsupported,
             _ => Code::BadInput,
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<CastersError> for Failure {
+    fn from(error: CastersError) -> Self {
+        let code = match error {
+            CastersError::Map(error) => return error.into(),
+            CastersError::Scene(error) => return (*error).into(),
+            CastersError::Reading { .. } => Code::Unsupported,
+            _ => Code::Missing,
         };
         Self::new(code, error.to_string())
     }

@@ -112,36 +112,6 @@ pub fn scale(text: &str) -> Result<DVec2, String> {
     }
 }
 
-/// Names of objects: a star stands for a part of one name, two for any names.
-#[derive(Clone, Debug)]
-pub struct Names(glob::Pattern);
-
-impl FromStr for Names {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let pattern = glob::Pattern::new(text);
-        pattern
-            .map(Self)
-            .map_err(|error| format!("no pattern of names: {}", error.msg))
-    }
-}
-
-impl Names {
-    pub fn match_name(&self, name: &str) -> bool {
-        let options = glob::MatchOptions {
-            case_sensitive: true,
-            require_literal_separator: true,
-            require_literal_leading_dot: false,
-        };
-        self.0.matches_with(name, options)
-    }
-
-    pub fn text(&self) -> &str {
-        self.0.as_str()
-    }
-}
-
 /// A part of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {

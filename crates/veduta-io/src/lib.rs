@@ -7,6 +7,15 @@
 //!
 //! Each format is behind a feature of its name; all are on by default.
 
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "stl",
+    feature = "ply",
+    feature = "cityjson",
+    feature = "toml"
+))]
+mod casters;
 #[cfg(feature = "exr")]
 pub mod deep_exr;
 #[cfg(feature = "exr")]
@@ -14,6 +23,7 @@ pub mod depth_picture;
 #[cfg(feature = "exr")]
 mod guest;
 mod map_file;
+mod object_names;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",
@@ -29,9 +39,22 @@ mod scale;
 pub mod tone;
 mod write;
 
+#[cfg(any(
+    feature = "gltf",
+    feature = "obj",
+    feature = "stl",
+    feature = "ply",
+    feature = "cityjson",
+    feature = "toml"
+))]
+pub use casters::{
+    CastersError, SourceError, SourceProblem, check_source, choose_objects, read_casters,
+    reading_of,
+};
 #[cfg(feature = "exr")]
 pub use guest::{GuestOptions, GuestProblem, LoadedGuest, read_guest};
-pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, source_of, write_map};
+pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, write_map, write_spans};
+pub use object_names::ObjectNames;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",

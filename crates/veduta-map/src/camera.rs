@@ -71,6 +71,23 @@ impl Camera {
         })
     }
 
+    /// Whether its frame has an extent and its numbers are finite.
+    pub fn is_sound(&self) -> bool {
+        let extents = match self.projection {
+            Projection::Perspective {
+                tan_half_height,
+                aspect,
+            } => [tan_half_height, aspect],
+            Projection::Parallel { height, aspect } => [height, aspect],
+        };
+        let determinant = self.eye_from_world.determinant();
+        extents
+            .iter()
+            .all(|&extent| extent > 0.0 && extent.is_finite())
+            && self.eye_from_world.is_finite()
+            && (determinant.is_normal() && self.near.is_finite() && self.shift.is_finite())
+    }
+
     /// The camera with a frame of another shape: its height is kept, and the width grows or shrinks on
     /// both sides of the frame's middle.
     pub fn with_aspect(mut self, aspect: f64) -> Self {
@@ -79,6 +96,28 @@ impl Camera {
             Projection::Perspective { aspect: of, .. }
             | Projection::Parallel { aspect: of, .. } => *of = aspect,
         }
+        self
+    }
+
+    /// The camera whose frame is a part of this one's, from its left top corner in the image plane to its
+    /// right bottom one; the part may reach beyond.
+    ///
+    /// # Panics
+    /// If the part has no extent.
+    pub fn with_window(mut self, [min, max]: [DVec2; 2]) -> Self {
+        let extent = max - min;
+        assert!(extent.cmpgt(DVec2::ZERO).all(), "a window has an extent");
+        let ahead = (self.principal_point() - min) / extent;
+        self.shift = DVec2::new(0.5 - ahead.x, ahead.y - 0.5);
+        let (height, aspect) = match &mut self.projection {
+            Projection::Perspective {
+                tan_half_height,
+                aspect,
+            } => (tan_half_height, aspect),
+            Projection::Parallel { height, aspect } => (height, aspect),
+        };
+        *height *= extent.y;
+        *aspect *= extent.x / extent.y;
         self
     }
 
@@ -215,6 +254,21 @@ mod tests {
             let middle = |camera: &Camera| camera.eye_from_image(DVec2::splat(0.5), -1.0);
             let wide = camera.with_aspect(3.0);
             assert!((middle(&wide) - middle(&camera)).length() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_window_shows_its_part_of_the_frame() {
+        for projection in BOTH {
+            let mut camera = camera(projection);
+            camera.shift = DVec2::new(0.2, -0.1);
+            let window = [DVec2::new(0.25, -0.5), DVec2::new(0.5, 0.25)];
+            let part = camera.with_window(window);
+            for point in [DVec3::new(0.3, 0.2, 4.0), DVec3::new(-1.0, 0.5, 2.0)] {
+                let image = camera.image_from_eye(point);
+                let expected = (image - window[0]) / (window[1] - window[0]);
+                assert!((part.image_from_eye(point) - expected).length() < 1e-12);
+            }
         }
     }
 

@@ -8,6 +8,7 @@
 //! or shape; pixels come later, as an affine map of the image plane. So a map has no resolution.
 
 mod camera;
+mod casters;
 mod faces;
 pub mod file;
 mod fragments;
@@ -16,14 +17,17 @@ mod ids;
 mod line;
 mod map;
 pub mod scene;
+mod spans;
 mod stored;
 
 pub use camera::{Camera, Projection};
+pub use casters::{Casters, Choice, Origin, Reading, Source};
 pub use faces::Faces;
 pub use fragments::{Fragment, Fragments, Seen, Side};
 pub use guest::{Guest, GuestError, GuestGrid, GuestKind, GuestSamples};
 pub use ids::{FaceId, LineId, MaterialId, ObjectId, PlaneId};
 pub use line::{FrameSide, Line, Lines};
 pub use map::{Invariant, VisibilityMap};
+pub use spans::{SeenSpans, Span, SpanBand, Spans, TooFewSubScanlines};
 pub use stored::{ObjectMesh, SeenScene};
 pub use veduta_geometry::Affine;

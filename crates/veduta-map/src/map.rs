@@ -1,5 +1,5 @@
 use crate::{Camera, FaceId, Faces, Fragment, Fragments};
-use veduta_geometry::{DVec2, signed_area};
+use veduta_geometry::{Cells, DVec2, GridAreas, signed_area};
 
 /// Which face is seen where: the result of finding visibility, and the input of all that follows.
 ///
@@ -55,7 +55,23 @@ pub enum Invariant {
         /// The sum of the areas, where the frame's is 1.
         area: f64,
     },
+    /// Nor do they anywhere sum to more than there is.
+    #[error("opaque fragments overlap at {place}: they cover {area} of a small square around it")]
+    OverlapAt {
+        /// The middle of the square, in the image plane.
+        place: DVec2,
+        /// The sum of the areas, where the square's is 1.
+        area: f64,
+    },
 }
+
+/// Squares along each side of the frame in which areas are summed to find overlaps. More find smaller ones
+/// beside gaps, and take longer.
+const SQUARES: u32 = 256;
+
+/// What the areas in a square may sum to beyond 1. Larger would hide overlaps; smaller would report the
+/// last bits of squares that thousands of fragments share.
+const MOST_OVERLAP: f64 = 1e-6;
 
 /// How far outside the frame, or on the wrong side of convex, rounding may put a vertex. Larger
 /// would hide real faults; smaller would report the last bits of sound maps.
@@ -124,9 +140,41 @@ impl VisibilityMap {
         self.check_fragments(&self.veils)?;
         let area = self.check_fragments(&self.opaque)?;
         if area > 1.0 + 1e-9 {
-            Err(Invariant::Overlap { area })
-        } else {
-            Ok(())
+            return Err(Invariant::Overlap { area });
+        }
+        self.check_overlaps()
+    }
+
+    /// Sums up what opaque fragments cover of each of a grid of squares.
+    fn check_overlaps(&self) -> Result<(), Invariant> {
+        let mut areas = vec![0.0; (SQUARES * SQUARES) as usize];
+        let mut grid_areas = GridAreas::new();
+        let mut scaled = Vec::new();
+        for fragment in self.opaque.iter() {
+            scaled.clear();
+            let polygon = self.polygon(fragment).iter();
+            scaled.extend(polygon.map(|&vertex| vertex * f64::from(SQUARES)));
+            grid_areas.each_cell(&scaled, SQUARES, 0..SQUARES, |cells| {
+                let (row, columns, area) = match cells {
+                    Cells::Boundary { column, row, area } => (row, column..column + 1, area),
+                    Cells::Inside { row, columns } => (row, columns, 1.0),
+                };
+                for column in columns {
+                    areas[(row * SQUARES + column) as usize] += area;
+                }
+            });
+        }
+        let over = areas.iter().position(|&area| area > 1.0 + MOST_OVERLAP);
+        match over {
+            None => Ok(()),
+            Some(square) => {
+                let (x, y) = (square as u32 % SQUARES, square as u32 / SQUARES);
+                let corner = DVec2::new(f64::from(x), f64::from(y));
+                Err(Invariant::OverlapAt {
+                    place: (corner + 0.5) / f64::from(SQUARES),
+                    area: areas[square],
+                })
+            }
         }
     }
 
@@ -207,6 +255,14 @@ mod tests {
             veils: Fragments::new(),
         };
         map.check().expect("sound");
+        let mut twice = map.clone();
+        twice
+            .opaque
+            .push_cut(second, square.map(|vertex| (vertex, side)).into_iter());
+        let Err(Invariant::OverlapAt { place, area }) = twice.check() else {
+            panic!("the second is seen where the first is, in a quarter of the frame");
+        };
+        assert!((place - square[0]).max_element() < 0.01 && (area - 2.0).abs() < 1e-9);
         let middle = DVec2::splat(0.5);
         assert_eq!(map.opaque_at(middle), Some(0));
         assert_eq!(map.opaque_at(DVec2::new(0.875, 0.5)), Some(1));

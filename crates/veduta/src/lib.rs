@@ -17,6 +17,7 @@ pub mod filter;
 pub mod pipeline;
 pub mod scene;
 pub mod shade;
+mod sweep;
 pub mod visibility;
 
 pub use veduta_geometry as geometry;

@@ -8,7 +8,7 @@ mod filtered;
 mod guests;
 mod mattes;
 
-pub use deep::render_deep;
+pub use deep::{deep_window, render_deep};
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
 use crate::dice::{
@@ -20,7 +20,7 @@ use crate::filter::Filter;
 use crate::scene::{Opacities, Opacity, Scene};
 use crate::shade::light::Daylight;
 use crate::shade::{Radiance, Surfaces, Textures};
-use crate::visibility::multiscan::{self, Spans};
+use crate::visibility::multiscan;
 use crate::visibility::{self, Seen, Strips, speculative};
 use aovs::{AovBuffers, AovMaker};
 use guests::GuestLayers;
@@ -29,7 +29,10 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
-use veduta_map::{Camera, FaceId, Faces, Guest, MaterialId, SeenScene, VisibilityMap};
+use veduta_map::{
+    Camera, FaceId, Faces, Guest, MaterialId, SeenScene, SeenSpans, Spans, TooFewSubScanlines,
+    VisibilityMap,
+};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,7 +165,13 @@ pub fn render(
         begin(Step::FindingVisibility);
         let spans = multiscan::find_spans(&faces, grid.width, grid.height, n);
         begin(Step::Shading);
-        return render_spans(scene, camera, &faces, &spans, settings);
+        let (unlit, aovs) = (settings.unlit, settings.aovs);
+        let (picture, aovs) = paint_spans(scene, camera, &faces, &spans, &grid, unlit, aovs);
+        return Rendered {
+            picture,
+            aovs,
+            shortcomings: veils_left_out(&faces),
+        };
     }
     if faces.len() > grid.pixel_count() {
         let strips = faces.len().div_ceil(FACES_PER_STRIP);
@@ -470,23 +479,66 @@ fn add(sum: &mut [f64; 4], other: [f64; 4]) {
     }
 }
 
-/// Makes a picture of what multiscan found.
-fn render_spans(
+/// Finds what `camera` sees of `scene` along `n` sub-scanlines of each row of a picture of `width` x
+/// `height` pixels, and what that leaves out.
+///
+/// # Panics
+/// As [`multiscan::find_spans`].
+pub fn find_spans(
+    scene: &Scene,
+    camera: &Camera,
+    [width, height]: [u32; 2],
+    n: u32,
+) -> (SeenSpans, Vec<Shortcoming>) {
+    let faces = visibility::project(scene, camera);
+    let spans = multiscan::find_spans(&faces, width, height, n);
+    let left_out = veils_left_out(&faces);
+    (SeenSpans::of(scene, camera, faces, &spans), left_out)
+}
+
+/// That multiscan leaves veils out, if there are any.
+fn veils_left_out(faces: &Faces) -> Vec<Shortcoming> {
+    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
+    let left_out = (veils > 0).then_some(Shortcoming::VeilsLeftOut(veils));
+    left_out.into_iter().collect()
+}
+
+/// Makes the picture of what multiscan found on any grid of pixels, with channels beside the light.
+///
+/// # Errors
+/// [`TooFewSubScanlines`] where the picture is enlarged too much.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory.
+pub fn render_spans(
+    seen: &SeenSpans,
+    grid: &PixelGrid,
+    unlit: bool,
+    aovs: AovSettings,
+) -> Result<(Picture, Aovs), TooFewSubScanlines> {
+    let (frame, size) = (grid.pixels_per_frame, [grid.width, grid.height]);
+    let spans = seen.spans.on_grid(frame, grid.origin, size)?;
+    let (scene, camera, faces) = (&seen.scene, &seen.camera, &seen.faces);
+    Ok(paint_spans(scene, camera, faces, &spans, grid, unlit, aovs))
+}
+
+/// Makes a picture of spans that lie on the rows of `grid`.
+fn paint_spans(
     scene: &Scene,
     camera: &Camera,
     faces: &Faces,
     spans: &Spans,
-    settings: &RenderSettings,
-) -> Rendered {
+    grid: &PixelGrid,
+    unlit: bool,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
     let shown = spans.faces();
     let materials = shown.iter().map(|&face| material_of(scene, faces, face));
-    let materials: BTreeSet<MaterialId> = materials.collect();
-    let textures = Textures::new(scene, &materials);
-    let (light, unlit) = (Daylight::default(), settings.unlit);
+    let textures = Textures::new(scene, &materials.collect());
+    let light = Daylight::default();
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
-    let grid = PixelGrid::of_frame(spans.width(), spans.height());
-    let mut canvas = Canvas::new(&grid, Filter::Box, settings.aovs);
+    let mut canvas = Canvas::new(grid, Filter::Box, aovs);
     let maker = canvas.maker(scene, &textures, camera, faces, &shown);
     let are_seen = scene.are_seen();
     let dice = |band: usize, buffers: &mut BandBuffers| {
@@ -500,23 +552,9 @@ fn render_spans(
             parts.runs.retain(|run| is_seen(run.fragment));
         }
     };
-    canvas.paint(
-        &surfaces,
-        maker.as_ref(),
-        Blended::default(),
-        &grid,
-        0,
-        dice,
-    );
-    let veils = faces.ids().filter(|&face| faces.is_veil(face)).count();
-    Rendered {
-        picture: canvas.picture,
-        aovs: canvas.aovs,
-        shortcomings: (veils > 0)
-            .then_some(Shortcoming::VeilsLeftOut(veils))
-            .into_iter()
-            .collect(),
-    }
+    let blended = Blended::default();
+    canvas.paint(&surfaces, maker.as_ref(), blended, grid, 0, dice);
+    (canvas.picture, canvas.aovs)
 }
 
 /// Faces of a strip, about, where there are more faces than pixels: enough to keep all cores at
@@ -679,16 +717,30 @@ fn materials_seen(scene: &Scene, map: &VisibilityMap) -> BTreeSet<MaterialId> {
 
 /// What [`render_map`] does not show as it should, in ascending order.
 pub fn shortcomings(scene: &Scene, map: &VisibilityMap) -> Vec<Shortcoming> {
-    let opacities = Opacities::of(scene);
     let opaque = (0..map.opaque.len()).map(|fragment| map.opaque.face(fragment));
-    let drawn_opaque: BTreeSet<MaterialId> = opaque
+    drawn_opaque(scene, &map.faces, opaque)
+}
+
+/// What [`render_spans`] does not show as it should, in ascending order, beside what was left out when
+/// they were found.
+pub fn shortcomings_of_spans(seen: &SeenSpans) -> Vec<Shortcoming> {
+    drawn_opaque(&seen.scene, &seen.faces, seen.faces.ids())
+}
+
+fn drawn_opaque(
+    scene: &Scene,
+    faces: &Faces,
+    shown: impl Iterator<Item = FaceId>,
+) -> Vec<Shortcoming> {
+    let opacities = Opacities::of(scene);
+    let materials: BTreeSet<MaterialId> = shown
         .filter(|&face| {
-            let (object, source) = (map.faces.object(face), map.faces.source(face));
+            let (object, source) = (faces.object(face), faces.source(face));
             opacities.of_face(object, source) != Opacity::Opaque
         })
-        .map(|face| material_of(scene, &map.faces, face))
+        .map(|face| material_of(scene, faces, face))
         .collect();
-    drawn_opaque
+    materials
         .into_iter()
         .map(Shortcoming::DrawnOpaque)
         .collect()
@@ -1130,6 +1182,54 @@ mod tests {
             assert!(error < 1.0 / n as f32, "{error} with {n} sub-scanlines");
             assert!(error > 0.0, "multiscan is not exact");
         }
+    }
+
+    #[test]
+    fn scaled_spans_are_off_by_more_the_fewer_sub_scanlines_are_left() {
+        let made = crate::scene::generate::by_name("balls3").expect("a generated scene");
+        let camera = made.camera.with_aspect(1.5);
+        let map = find_visibility(&made.scene, &camera);
+        let aovs = AovSettings::default();
+        // Root mean square of what the opacity is off by, scaled by `scale` along y.
+        let error_of = |n: u32, scale: f64| {
+            let (seen, _) = find_spans(&made.scene, &camera, [90, 60], n);
+            let mut grid = PixelGrid::of_frame(90, (60.0 * scale).round() as u32);
+            grid.pixels_per_frame.x *= 1.25;
+            grid.origin.x = 10.5;
+            let (found, _) = render_spans(&seen, &grid, true, aovs).expect("is close enough");
+            let exact = render_window(&made.scene, &map, &grid, true);
+            let pairs = found.pixels.iter().zip(&exact.pixels);
+            let squares = pairs.map(|(a, b)| f64::from(a[3] - b[3]).powi(2));
+            (squares.sum::<f64>() / grid.pixel_count() as f64).sqrt()
+        };
+        // With n at equal scale, then with the scale at equal n.
+        for errors in [
+            [64, 16, 4, 1].map(|n| error_of(n, 1.0)),
+            [0.5, 1.0, 2.0, 4.0].map(|scale| error_of(8, scale)),
+        ] {
+            assert!(
+                errors.windows(2).all(|pair| 1.3 * pair[0] < pair[1]),
+                "{errors:?}"
+            );
+            assert!(errors[0] > 0.0, "multiscan is not exact");
+        }
+        // What is not scaled is what was rendered, to the last bit.
+        let (seen, left_out) = find_spans(&made.scene, &camera, [90, 60], 3);
+        assert_eq!(left_out, []);
+        let settings = RenderSettings {
+            sampling: Sampling::Multiscan(3),
+            ..unlit(90, 60)
+        };
+        let expected = render(&made.scene, &camera, &settings, |_| {}).picture;
+        let (found, _) =
+            render_spans(&seen, &PixelGrid::of_frame(90, 60), true, aovs).expect("is as it was");
+        assert!(found == expected);
+        let enlarged = PixelGrid::of_frame(90, 181);
+        let error = render_spans(&seen, &enlarged, true, aovs).expect_err("is too large");
+        assert!(
+            error.to_string().contains("up to 3 times as high"),
+            "{error}"
+        );
     }
 
     #[test]

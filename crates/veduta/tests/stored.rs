@@ -5,13 +5,14 @@ use std::io::Cursor;
 use veduta::composite::composite;
 use veduta::dice::{PixelGrid, coverage};
 use veduta::map::file::{MapReader, write_map};
-use veduta::map::{SeenScene, VisibilityMap};
+use veduta::map::{Origin, SeenScene, VisibilityMap};
 use veduta::pipeline::{RenderSettings, find_visibility, render_map};
 use veduta::scene::generate::{Generated, by_name};
 use veduta::scene::{Mesh, MeshId, Scene};
 
 fn stored_and_read(seen: &SeenScene) -> SeenScene {
-    let bytes = write_map(Cursor::new(Vec::new()), seen, &[]).expect("memory takes all");
+    let bytes =
+        write_map(Cursor::new(Vec::new()), seen, &Origin::default()).expect("memory takes all");
     let bytes = bytes.into_inner();
     MapReader::new(Cursor::new(bytes))
         .expect("sound")

@@ -4,23 +4,20 @@ use super::guests::{Depths, GuestInput, kind_name};
 use super::look::Look;
 use super::output::Output;
 use super::stored::{
-    Changes, Trust, laid_on, open, refusal, refuse_filter_of_guests, refuse_place, summary,
+    Changes, Stored, Trust, laid_on, open, refusal, refuse_filter_of_guests, refuse_place,
     tell_work,
 };
 use super::{tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
-use crate::values::Names;
 use clap::Args;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use veduta::composite::{Operator, hold_out, operate};
+use veduta::composite::{Operator, composite_spans, hold_out, operate, unite};
 use veduta::dice::PixelGrid;
-use veduta::map::SeenScene;
-use veduta::map::file::Source;
-use veduta::pipeline;
+use veduta::map::{Casters, Choice, Origin, SeenScene, SeenSpans};
 use veduta::scene::Shown;
-use veduta_io::{Layers, write_map};
+use veduta_io::{Layers, ObjectNames, choose_objects};
 
 /// Put stored maps, and pictures of other programs, together by depth
 ///
@@ -60,15 +57,15 @@ pub struct Composite {
     /// their shape. What is not opaque hides nothing. Names match with *, ** and ?. May be given several
     /// times
     #[arg(long, value_name = "NAME")]
-    matte: Vec<Names>,
+    matte: Vec<ObjectNames>,
     /// Take only the objects of these names from the maps; names match with *, ** and ?. May be given
     /// several times
     #[arg(long, value_name = "NAME")]
-    only: Vec<Names>,
+    only: Vec<ObjectNames>,
     /// Leave out the objects of these names: where they were seen, nothing of their map is. May be given
     /// several times
     #[arg(long, value_name = "NAME")]
-    without: Vec<Names>,
+    without: Vec<ObjectNames>,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -130,33 +127,44 @@ impl Composite {
         }
         let Read {
             mut maps,
+            spans,
             files,
-            sources,
+            shown,
+            origins,
             told: inputs,
-        } = self.read(talk)?;
-        self.select(&mut maps)?;
+        } = self.read(map_place.is_some(), talk)?;
         talk.begin("compositing");
-        let mut seen = self.composite(&maps, &files)?;
+        let mut seen = if spans.is_empty() {
+            self.select(&mut maps)?;
+            let seen = self.composite(&maps, &files)?;
+            let seen = laid_on(seen, &self.look, self.trust, |reader| reader.read())?;
+            Stored::Regions(seen)
+        } else {
+            self.refuse_regions(&maps)?;
+            let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+            let seen = composite_spans(&spans).map_err(|error| refusal(&error, &files))?;
+            Stored::Spans(seen)
+        };
         drop(maps);
-        seen = laid_on(seen, &self.look, self.trust, |reader| reader.read())?;
-        self.changes.apply(&mut seen.scene, self.strict, talk)?;
+        self.changes.apply(seen.scene_mut(), self.strict, talk)?;
         let mut told = serde_json::json!({
-            "size": seen.size,
+            "size": seen.size(),
             "inputs": inputs,
-            "facesSeen": seen.map.faces.len(),
+            "facesSeen": seen.faces().len(),
         });
         if let Some(place) = map_place {
             talk.begin("writing");
-            write_map(place, &seen, &sources)?;
+            let origin = self.origin(&shown, origins, talk)?;
+            seen.write(place, &origin)?;
             told["output"] = place.to_string_lossy().into();
         }
         if let Some(target) = &target {
-            let [width, height] = seen.size;
-            let development = self.look.development(&seen.scene, self.strict, talk)?;
-            let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
+            let [width, height] = seen.size();
+            let development = self.look.development(seen.scene(), self.strict, talk)?;
+            let shortcomings = seen.shortcomings();
             tell_shortcomings(
                 &self.inputs[0],
-                &seen.scene,
+                seen.scene(),
                 &shortcomings,
                 self.strict,
                 talk,
@@ -165,12 +173,17 @@ impl Composite {
             let grid = PixelGrid::of_frame(width, height);
             let (aovs, filter) = (self.output.aovs(), self.look.filter());
             refuse_filter_of_guests(&self.inputs[0], &seen, &self.look)?;
-            let unlit = self.look.unlit;
-            let (mut picture, aovs) = pipeline::render_seen(&seen, &grid, unlit, filter, aovs);
+            if matches!(seen, Stored::Spans(_)) {
+                self.look
+                    .refuse_filter("filters weigh exact regions, not spans")?;
+            }
+            let (mut picture, aovs) = seen
+                .picture(&grid, self.look.unlit, filter, aovs)
+                .expect("a picture in its own size needs no more sub-scanlines");
             let layers = Layers {
                 aovs: &aovs,
-                scene: &seen.scene,
-                camera: &seen.map.camera,
+                scene: seen.scene(),
+                camera: seen.camera(),
                 grid,
             };
             tell_of_mattes(&self.inputs[0], &layers, self.strict, talk)?;
@@ -181,7 +194,7 @@ impl Composite {
             told["output"] = target.name().into();
         }
         talk.end();
-        talk.detail(format_args!("{}", summary(&seen)));
+        talk.detail(format_args!("{}", seen.summary()));
         if json {
             told["warnings"] = talk.warnings().into();
             tell_work(&mut told);
@@ -192,7 +205,9 @@ impl Composite {
 
     /// Reads all maps, then all pictures of other programs, which are seen as the maps are: with the first of
     /// the maps, since that one is shown; with none in an empty one.
-    fn read(&self, talk: &mut Talk) -> Result<Read, Failure> {
+    ///
+    /// What they are made of is read too, if it `is_stored`.
+    fn read(&self, is_stored: bool, talk: &mut Talk) -> Result<Read, Failure> {
         talk.begin("reading");
         let mut pictures = Vec::new();
         let mut shown: Vec<&Path> = Vec::new();
@@ -210,12 +225,20 @@ impl Composite {
         for (index, &path) in files.iter().enumerate() {
             talk.part(index, all);
             let mut map = open(path)?;
-            for source in map.reader().sources() {
-                if !read.sources.contains(source) {
-                    read.sources.push(source.clone());
-                }
+            if is_stored {
+                read.origins.push(map.origin()?);
             }
-            let seen = map.read(|reader| reader.read())?;
+            read.files.push(path.to_owned());
+            let seen = match Stored::read(&mut map)? {
+                Stored::Regions(seen) => seen,
+                Stored::Spans(seen) => {
+                    let n = seen.spans.sub_scanlines_per_row();
+                    let exactness = format!("sampled on {n} sub-scanlines a row");
+                    read.tell(path, "spans", &exactness, talk);
+                    read.spans.push(seen);
+                    continue;
+                }
+            };
             let seen = match read.maps.first() {
                 Some(first) => self.trust.apply(path, seen, first)?,
                 None => seen,
@@ -229,7 +252,6 @@ impl Composite {
                     talk,
                 );
             }
-            read.files.push(path.to_owned());
             read.maps.push(seen);
         }
         let mut camera = read.maps.first().map(|seen| seen.map.camera);
@@ -243,6 +265,14 @@ impl Composite {
             let kind = loaded.guest.kind();
             read.tell(&picture.path, kind_name(kind), kind.exactness(), talk);
             guests.push(loaded.guest);
+        }
+        read.shown = shown.iter().map(|&path| path.to_owned()).collect();
+        if !read.spans.is_empty() {
+            if !guests.is_empty() {
+                let message = "pictures of other programs are laid between regions, not spans";
+                return Err(Failure::new(Code::Usage, message));
+            }
+            return Ok(read);
         }
         if shown.is_empty() {
             let camera = camera.expect("an input is a map or has told a camera");
@@ -281,6 +311,82 @@ impl Composite {
         Ok(seen)
     }
 
+    /// Fails for what spans cannot be composited with or by.
+    fn refuse_regions(&self, maps: &[SeenScene]) -> Result<(), Failure> {
+        let usage = |message: &str| Err(Failure::new(Code::Usage, message));
+        if !maps.is_empty() {
+            return usage(
+                "some of the maps hold regions and others spans on sub-scanlines; make all of them \
+                 with the same --sampling",
+            );
+        }
+        let of_files = [&self.holdout, &self.inside, &self.outside, &self.atop];
+        let of_names = [&self.matte, &self.only, &self.without];
+        if of_files.iter().any(|list| !list.is_empty())
+            || of_names.iter().any(|list| !list.is_empty())
+        {
+            return usage(
+                "--holdout, --in, --out, --atop, --matte, --only and --without are for maps of regions, \
+                 not of spans",
+            );
+        }
+        self.look
+            .refuse_background_map_of("a map is laid behind maps of regions, not of spans")
+    }
+
+    /// What the composite is made of. What only hides casts no shadow on what is shown.
+    fn origin(
+        &self,
+        shown: &[PathBuf],
+        origins: Vec<Origin>,
+        talk: &mut Talk,
+    ) -> Result<Origin, Failure> {
+        let sources = origins.iter().flat_map(|origin| origin.sources.clone());
+        let sources = sources.collect();
+        let mut embedded = Vec::new();
+        let mut readings = Vec::new();
+        for (origin, path) in origins.into_iter().zip(shown) {
+            let Some(casters) = origin.casters else {
+                talk.warn(format!(
+                    "{}: does not tell what casts shadows, so that the composite does not either; \
+                     make the map again",
+                    path.display()
+                ));
+                let casters = None;
+                return Ok(Origin { sources, casters });
+            };
+            embedded.extend(casters.embedded);
+            readings.extend(casters.readings);
+        }
+        let text = |names: &[ObjectNames]| -> Vec<String> {
+            names.iter().map(|names| names.text().to_owned()).collect()
+        };
+        let choice = Choice {
+            only: text(&self.only),
+            without: text(&self.without),
+        };
+        if choice != Choice::default() {
+            for scene in &mut embedded {
+                let chosen = choose_objects(scene, &choice);
+                chosen.map_err(|problem| Failure::new(Code::Usage, problem))?;
+            }
+            for reading in &mut readings {
+                reading.choices.push(choice.clone());
+            }
+        }
+        let mut embedded = match embedded.len() {
+            0 | 1 => embedded.pop(),
+            _ => Some(unite(&embedded.iter().collect::<Vec<_>>())),
+        };
+        if let Some(scene) = &mut embedded {
+            self.changes.apply_to_casters(scene)?;
+        }
+        Ok(Origin {
+            sources,
+            casters: Some(Casters { embedded, readings }),
+        })
+    }
+
     /// Leaves the objects asked for in the maps; a name that no object has is an error.
     fn select(&self, maps: &mut [SeenScene]) -> Result<(), Failure> {
         let options = [&self.holdout, &self.inside, &self.outside, &self.atop];
@@ -294,7 +400,8 @@ impl Composite {
                 return Err(Failure::new(Code::Missing, message));
             }
         }
-        let is_of = |list: &[Names], name: &str| list.iter().any(|names| names.match_name(name));
+        let is_of =
+            |list: &[ObjectNames], name: &str| list.iter().any(|names| names.match_name(name));
         if !self.matte.is_empty() {
             for seen in maps.iter_mut().take(shown) {
                 let is_matte = |name: &str| is_of(&self.matte, name);
@@ -317,9 +424,14 @@ impl Composite {
 #[derive(Default)]
 struct Read {
     maps: Vec<SeenScene>,
+    /// Maps of spans; with them there is no other.
+    spans: Vec<SeenSpans>,
     /// Of each map its file.
     files: Vec<PathBuf>,
-    sources: Vec<Source>,
+    /// The files of those that are shown.
+    shown: Vec<PathBuf>,
+    /// What they are made of, in the order of the files.
+    origins: Vec<Origin>,
     /// What is told of each input.
     told: Vec<Value>,
 }

@@ -1,12 +1,9 @@
-//! `veduta render --deep`: a deep picture is written while it is made.
+//! Deep pictures of `veduta render --deep` and `veduta shade --deep`: they are written while they are made.
 
 use super::output::{Target, written_to_stdout};
-use super::render::tell_step;
 use crate::exit::Failure;
-use crate::talk::Talk;
 use std::io;
 use veduta::map::Camera;
-use veduta::pipeline::{self, RenderSettings};
 use veduta::scene::Scene;
 use veduta_io::deep_exr::{
     DeepCompression, DeepPicture, DeepSink, ObjectIds, stream_deep_picture, write_deep_picture,
@@ -22,28 +19,27 @@ pub struct DeepTarget<'a> {
 }
 
 impl DeepTarget<'_> {
-    /// Makes the picture there; returns how many samples were written.
-    pub fn write(
+    /// Writes there the rows that `make` hands over, of a picture of `scene` whose frame is that of
+    /// `camera`. How many samples were written, and what `make` tells.
+    pub fn write<T: Default>(
         &self,
         scene: &Scene,
-        camera: &Camera,
-        settings: &RenderSettings,
-        talk: &mut Talk,
-    ) -> Result<u64, Failure> {
+        camera: Camera,
+        [width, height]: [u32; 2],
+        make: impl FnOnce(&mut DeepSink) -> Result<T, WriteProblem>,
+    ) -> Result<(u64, T), Failure> {
         let names = scene.objects.iter().map(|object| object.name.as_str());
         let picture = DeepPicture {
-            width: settings.width,
-            height: settings.height,
-            camera: *camera,
+            width,
+            height,
+            camera,
             objects: ObjectIds::of_names(names),
             samples: self.samples,
             compression: self.compression,
         };
-        let make = |sink: &mut DeepSink| -> Result<u64, WriteProblem> {
-            let begin = |step| tell_step(step, talk);
-            let write = |rows: &_| sink.write(rows);
-            pipeline::render_deep(scene, camera, settings, begin, write)?;
-            Ok(sink.samples_written())
+        let make = |sink: &mut DeepSink| -> Result<(u64, T), WriteProblem> {
+            let made = make(sink)?;
+            Ok((sink.samples_written(), made))
         };
         match self.target.file() {
             Some(path) => Ok(write_deep_picture(path, &picture, make)?),

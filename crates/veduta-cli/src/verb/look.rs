@@ -100,6 +100,17 @@ impl Look {
         }
     }
 
+    /// Fails for a stored map as background where that has no meaning, and tells why.
+    pub fn refuse_background_map_of(&self, why: &str) -> Result<(), Failure> {
+        match self.background_map() {
+            None => Ok(()),
+            Some(path) => {
+                let message = format!("{}: {why}", path.display());
+                Err(Failure::new(Code::Usage, message))
+            }
+        }
+    }
+
     /// Fails for a stored map as background, for a verb that works with scenes.
     pub fn refuse_background_map(&self) -> Result<(), Failure> {
         let Some(path) = self.background_map() else {

@@ -1,7 +1,7 @@
 use super::deep::DeepTarget;
 use super::look::Look;
 use super::output::{Output, Target};
-use super::stored::{refuse_place, summary, tell_work};
+use super::stored::{Stored, refuse_place, tell_work};
 use super::vector::{Subject, Vector, VectorTarget};
 use super::{Reading, load, tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
@@ -13,11 +13,11 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Aovs;
 use veduta::dice::PixelGrid;
-use veduta::map::{Camera, Projection, SeenScene};
+use veduta::map::{self, Camera, Casters, Origin, Projection, SeenScene, Source};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Step};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene, framing_camera_of_fov};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Layers, Loaded, scaled, source_of, write_map};
+use veduta_io::{Layers, Loaded, reading_of, scaled};
 
 /// Make a picture of a model
 ///
@@ -41,7 +41,8 @@ pub struct Render {
     /// Show one layer of a scene file only; may be given several times
     #[arg(long, value_name = "NAME")]
     layer: Vec<String>,
-    /// How areas in pixels are found: exact, or multiscan:N for N sub-scanlines a pixel
+    /// How areas in pixels are found: exact, or multiscan:N for N sub-scanlines a pixel. A .veduta keeps
+    /// the spans on these, which scale less well than regions
     #[arg(long, value_name = "HOW", default_value = "exact", value_parser = values::sampling)]
     sampling: Sampling,
     /// Keep of each pixel all that is seen in it, each face with its depth and its object's id: a deep
@@ -55,6 +56,11 @@ pub struct Render {
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
+
+    /// Keep the whole scene in a .veduta, hidden faces and those off the picture too, for shadows and
+    /// mirrors; otherwise it names the files to read again
+    #[arg(long, requires = "output")]
+    self_contained: bool,
 
     #[command(flatten)]
     output: Output,
@@ -84,8 +90,9 @@ Examples:
       veduta render town.obj -o town.pdf --lines crease --line-width 0.25mm
   Lines only, for an illustration:
       veduta render town.obj -o a.svg --fill none --lines silhouette,crease
-  What is seen, kept for any number of pictures:
+  What is seen, kept for any number of pictures; and with all that is not seen, for shadows:
       veduta render town.obj -o kept.veduta
+      veduta render town.obj -o whole.veduta --self-contained
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -130,12 +137,14 @@ impl Render {
     pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         self.look.refuse_background_map()?;
         if let Some(target) = self.output.vector_target(&self.model, json)? {
+            self.refuse_self_contained()?;
             return self.draw(&target, json, talk);
         }
         self.vector.refuse()?;
         if let Some(place) = self.output.map_place() {
             return self.run_to_map(place, force, json, talk);
         }
+        self.refuse_self_contained()?;
         let target = self.output.target(&self.model, json)?;
         let deep_target = self.deep_target(&target)?;
         if self.sampling != Sampling::Exact {
@@ -269,7 +278,11 @@ impl Render {
             unlit: self.look.unlit,
             ..RenderSettings::default()
         };
-        let samples = target.write(scene, camera, &settings, talk)?;
+        let picture_size = [size.width, size.height];
+        let (samples, ()) = target.write(scene, *camera, picture_size, |sink| {
+            let begin = |step| tell_step(step, talk);
+            pipeline::render_deep(scene, camera, &settings, begin, |rows| sink.write(rows))
+        })?;
         talk.end();
         talk.detail(format_args!(
             "{} faces, {samples} samples",
@@ -335,35 +348,73 @@ impl Render {
         talk: &mut Talk,
     ) -> Result<(), Failure> {
         refuse_place(place, force)?;
-        let of_pictures = self.output.preview.is_some() || self.output.has_layers() || self.deep;
-        if of_pictures || self.sampling != Sampling::Exact {
-            let message = "a map is of no picture: --preview, --aov, --deep and --sampling are not \
-                for .veduta";
+        if self.output.preview.is_some() || self.output.has_layers() || self.deep {
+            let message = "a map is of no picture: --preview, --aov and --deep are not for .veduta";
             return Err(Failure::new(Code::Usage, message));
         }
         self.look.refuse_filter("a map is of no picture")?;
-        let source = source_of(&self.model)?;
         let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
+        let (faces, size) = (scene.face_count(), [size.width, size.height]);
         talk.begin("finding visibility");
-        let map = pipeline::find_visibility(&scene, &camera);
-        let seen = SeenScene::of(&scene, &map, [size.width, size.height]);
+        let seen = match self.sampling {
+            Sampling::Exact => {
+                let map = pipeline::find_visibility(&scene, &camera);
+                Stored::Regions(SeenScene::of(&scene, &map, size))
+            }
+            Sampling::Multiscan(n) => {
+                let (seen, left_out) = pipeline::find_spans(&scene, &camera, size, n);
+                tell_shortcomings(&self.model, &scene, &left_out, self.strict, talk)?;
+                Stored::Spans(seen)
+            }
+        };
         talk.begin("writing");
-        write_map(place, &seen, &[source])?;
+        seen.write(place, &self.origin(scene, loaded.files))?;
         talk.end();
-        talk.detail(format_args!("{}", summary(&seen)));
+        talk.detail(format_args!("{}", seen.summary()));
         if json {
             let mut told = serde_json::json!({
                 "output": place.to_string_lossy(),
-                "size": seen.size,
-                "faces": scene.face_count(),
-                "facesSeen": seen.map.faces.len(),
+                "size": size,
+                "faces": faces,
+                "facesSeen": seen.faces().len(),
                 "warnings": talk.warnings(),
             });
             tell_work(&mut told);
             print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// What a map of `scene` is made of. `files` are those that the scene was read from.
+    fn origin(&self, scene: Scene, files: Vec<Source>) -> Origin {
+        let casters = if self.self_contained {
+            Casters {
+                embedded: Some(scene),
+                readings: Vec::new(),
+            }
+        } else {
+            let reading = map::Reading {
+                layers: (!self.layer.is_empty()).then(|| self.layer.clone()),
+                ..reading_of(files.clone(), &self.view.reading.options())
+            };
+            Casters {
+                embedded: None,
+                readings: vec![reading],
+            }
+        };
+        Origin {
+            sources: files,
+            casters: Some(casters),
+        }
+    }
+
+    fn refuse_self_contained(&self) -> Result<(), Failure> {
+        if self.self_contained {
+            let message = "a picture does not hold its scene; --self-contained is for .veduta";
+            return Err(Failure::new(Code::Usage, message));
         }
         Ok(())
     }

@@ -1,14 +1,15 @@
 //! `veduta shade`: pixels of a stored map, at any scale and in other colours.
 
 use super::look::Look;
-use super::output::Output;
-use super::stored::{Changes, Trust, laid_on, open, refuse_filter_of_guests, tell_work};
+use super::output::{Output, Target};
+use super::stored::{Changes, Stored, Trust, laid_on, open, refuse_filter_of_guests, tell_work};
 use super::vector::{Subject, Vector};
 use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::Args;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use veduta::dice::PixelGrid;
 use veduta::drawing::LineKind;
@@ -34,6 +35,14 @@ pub struct Shade {
     /// Make only this part of it, in pixels of the whole picture; parts of pixels are fine
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::window, allow_hyphen_values = true)]
     window: Option<values::Window>,
+    /// Keep of each pixel all that is seen in it, each face with its depth and its object's id: a deep
+    /// .exr, which lays flat to the same picture
+    #[arg(
+        long,
+        requires = "output",
+        conflicts_with_all = ["preview", "background", "exposure", "tone", "aov"]
+    )]
+    deep: bool,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -62,6 +71,8 @@ Examples:
       veduta render hut.obj --eye 9,-9,5 --look-at 0,0,0 -o far.veduta
       veduta render town.obj --eye 9,-9,5 --look-at 0,0,0 -o near.veduta
       veduta shade near.veduta --background far.veduta -o before.png
+  For deep compositing, all that is seen in each pixel:
+      veduta shade town.veduta -o town-deep.exr --deep
   With what was red in another colour:
       veduta shade town.veduta --set 'material.\"red\".color=#446' -o slate.png
 ";
@@ -93,18 +104,118 @@ impl Shade {
             Some(_) => None,
             None => self.output.target(&self.map, json)?,
         };
+        let deep = match &pixels {
+            Some(target) if self.deep => {
+                let why = "a deep picture keeps what is seen in each pixel alone";
+                self.look.refuse_filter(why)?;
+                Some(self.output.deep_target(target)?)
+            }
+            _ => None,
+        };
         if vector.is_none() && pixels.is_none() {
             let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         }
+        if vector.is_some() && self.deep {
+            let message = "a deep picture is stored as .exr; leave --deep out";
+            return Err(Failure::new(Code::Usage, message));
+        }
         talk.begin("reading");
         let mut map = open(&self.map)?;
-        let [width, height] = map.reader().size();
+        let grid = self.grid(map.reader().size())?;
+        if let Some(target) = &pixels {
+            let [width, height] = [grid.width, grid.height];
+            target.refuse_size(Size { width, height })?;
+        }
+        // A filter looks beyond the window.
+        let reached = match self.look.filter().kernel() {
+            Some(kernel) => grid.between_centres(kernel.radius(), 1),
+            None => grid,
+        };
+        let window = |grid: &PixelGrid| {
+            let corner = DVec2::new(grid.width.into(), grid.height.into());
+            [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels))
+        };
+        let mut seen = match map.reader().sub_scanlines_per_row() {
+            None => {
+                let seen = map.read(|reader| reader.read_window(window(&reached)))?;
+                let seen = laid_on(seen, &self.look, self.trust, |reader| {
+                    reader.read_window(window(&reached))
+                })?;
+                if !seen.guests.is_empty() && (vector.is_some() || self.deep) {
+                    let message = format!(
+                        "{}: holds pictures of other programs, which are laid into flat pixels only",
+                        self.map.display()
+                    );
+                    return Err(Failure::new(Code::Unsupported, message));
+                }
+                Stored::Regions(seen)
+            }
+            Some(_) if vector.is_some() || self.deep => {
+                let message = format!(
+                    "{}: holds spans on sub-scanlines; vector and deep pictures are made of regions, \
+                     which veduta render finds without --sampling",
+                    self.map.display()
+                );
+                return Err(Failure::new(Code::Usage, message));
+            }
+            Some(_) => {
+                let why = "spans on sub-scanlines have no regions before a map as background";
+                self.look.refuse_background_map_of(why)?;
+                Stored::read(&mut map)?
+            }
+        };
+        let bytes_read = map.reader().bytes_read();
+        self.changes.apply(seen.scene_mut(), self.strict, talk)?;
+        let mut told = match (&seen, &vector, &deep, &pixels) {
+            (Stored::Regions(seen), Some((target, settings)), ..) => {
+                let development = self.look.development(&seen.scene, self.strict, talk)?;
+                let subject = Subject {
+                    file: &self.map,
+                    scene: &seen.scene,
+                    map: &seen.map,
+                    grid: &grid,
+                    unlit: self.look.unlit,
+                    strict: self.strict,
+                };
+                self.vector
+                    .draw(target, settings, &subject, &development, talk)?
+            }
+            (Stored::Regions(seen), _, Some(target), _) => {
+                let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
+                tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
+                talk.begin("shading");
+                let camera = seen.map.camera.with_window(window(&grid));
+                let size = [grid.width, grid.height];
+                let unlit = self.look.unlit;
+                let (samples, ()) = target.write(&seen.scene, camera, size, |sink| {
+                    let (scene, map) = (&seen.scene, &seen.map);
+                    pipeline::deep_window(scene, map, &grid, unlit, |rows| sink.write(rows))
+                })?;
+                talk.end();
+                talk.detail(format_args!("{samples} samples"));
+                json!({ "output": target.name(), "size": size, "samples": samples })
+            }
+            (_, _, _, Some(target)) => self.paint(target, &seen, &grid, talk)?,
+            _ => unreachable!("one of them was asked for"),
+        };
+        if json {
+            told["facesSeen"] = seen.faces().len().into();
+            told["bytesRead"] = bytes_read.into();
+            told["warnings"] = talk.warnings().into();
+            tell_work(&mut told);
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
+    /// The pixels to make of a map whose picture has `size`.
+    fn grid(&self, [width, height]: [u32; 2]) -> Result<PixelGrid, Failure> {
         let frame = match self.size {
             Some(size) => DVec2::new(size.width.into(), size.height.into()),
             None => DVec2::new(width.into(), height.into()) * self.scale.unwrap_or(DVec2::ONE),
         };
-        let (left_top, size) = match self.window {
+        let (origin, size) = match self.window {
             Some(window) => (window.left_top, window.size),
             None => {
                 let pixels = frame.round().max(DVec2::ONE);
@@ -113,83 +224,55 @@ impl Shade {
                 (DVec2::ZERO, size)
             }
         };
-        if let Some(target) = &pixels {
-            target.refuse_size(size)?;
-        }
-        let grid = PixelGrid {
+        Ok(PixelGrid {
             width: size.width,
             height: size.height,
             pixels_per_frame: frame,
-            origin: left_top,
-        };
-        let filter = self.look.filter();
-        // A filter looks beyond the window.
-        let reached = match filter.kernel() {
-            Some(kernel) => grid.between_centres(kernel.radius(), 1),
-            None => grid,
-        };
-        let corner = DVec2::new(reached.width.into(), reached.height.into());
-        let shown = [DVec2::ZERO, corner].map(|pixels| reached.image_from_pixels(pixels));
-        let seen = map.read(|reader| reader.read_window(shown))?;
-        let bytes_read = map.reader().bytes_read();
-        let mut seen = laid_on(seen, &self.look, self.trust, |reader| {
-            reader.read_window(shown)
-        })?;
-        self.changes.apply(&mut seen.scene, self.strict, talk)?;
-        let development = self.look.development(&seen.scene, self.strict, talk)?;
-        let mut told = if let Some((target, settings)) = &vector {
-            if !seen.guests.is_empty() {
-                let message = format!(
-                    "{}: holds pictures of other programs, which have no shapes: make a picture of pixels",
-                    self.map.display()
-                );
-                return Err(Failure::new(Code::Unsupported, message));
-            }
-            let subject = Subject {
-                file: &self.map,
-                scene: &seen.scene,
-                map: &seen.map,
-                grid: &grid,
-                unlit: self.look.unlit,
-                strict: self.strict,
-            };
-            self.vector
-                .draw(target, settings, &subject, &development, talk)?
-        } else if let Some(target) = &pixels {
-            talk.begin("shading");
-            let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
-            tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
-            let (aovs, unlit) = (self.output.aovs(), self.look.unlit);
-            refuse_filter_of_guests(&self.map, &seen, &self.look)?;
-            let (mut picture, aovs) = pipeline::render_seen(&seen, &grid, unlit, filter, aovs);
-            let layers = Layers {
-                aovs: &aovs,
-                scene: &seen.scene,
-                camera: &seen.map.camera,
-                grid,
-            };
-            tell_of_mattes(&self.map, &layers, self.strict, talk)?;
-            talk.begin("developing");
-            let ev = development.develop(&mut picture, !target.linear);
-            talk.begin("writing");
-            target.write(&picture, self.output.has_layers().then_some(&layers))?;
-            talk.end();
-            talk.detail(format_args!("exposure {ev:.2} EV"));
-            serde_json::json!({
-                "output": target.name(),
-                "size": [size.width, size.height],
-                "exposure": ev,
-            })
-        } else {
-            unreachable!("one of the two was asked for")
-        };
-        if json {
-            told["facesSeen"] = seen.map.faces.len().into();
-            told["bytesRead"] = bytes_read.into();
-            told["warnings"] = talk.warnings().into();
-            tell_work(&mut told);
-            print(&format!("{told}\n"))?;
+            origin,
+        })
+    }
+
+    /// Makes a picture of pixels; what to tell of it.
+    fn paint(
+        &self,
+        target: &Target,
+        seen: &Stored,
+        grid: &PixelGrid,
+        talk: &mut Talk,
+    ) -> Result<Value, Failure> {
+        let scene = seen.scene();
+        let development = self.look.development(scene, self.strict, talk)?;
+        talk.begin("shading");
+        let shortcomings = seen.shortcomings();
+        tell_shortcomings(&self.map, scene, &shortcomings, self.strict, talk)?;
+        if matches!(seen, Stored::Spans(_)) {
+            self.look
+                .refuse_filter("filters weigh exact regions, not spans")?;
         }
-        Ok(())
+        refuse_filter_of_guests(&self.map, seen, &self.look)?;
+        let (aovs, filter) = (self.output.aovs(), self.look.filter());
+        let picture = seen.picture(grid, self.look.unlit, filter, aovs);
+        let (mut picture, aovs) = picture.map_err(|error| {
+            let message = format!("{}: {error}", self.map.display());
+            Failure::new(Code::Usage, message)
+        })?;
+        let layers = Layers {
+            aovs: &aovs,
+            scene,
+            camera: seen.camera(),
+            grid: *grid,
+        };
+        tell_of_mattes(&self.map, &layers, self.strict, talk)?;
+        talk.begin("developing");
+        let ev = development.develop(&mut picture, !target.linear);
+        talk.begin("writing");
+        target.write(&picture, self.output.has_layers().then_some(&layers))?;
+        talk.end();
+        talk.detail(format_args!("exposure {ev:.2} EV"));
+        Ok(json!({
+            "output": target.name(),
+            "size": [grid.width, grid.height],
+            "exposure": ev,
+        }))
     }
 }

@@ -9,11 +9,18 @@ use serde_json::Value;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use veduta::accumulate::{AovSettings, Aovs, Picture};
 use veduta::composite::{CompositeError, lay_on, see_through};
-use veduta::map::SeenScene;
+use veduta::dice::PixelGrid;
+use veduta::filter::Filter;
 use veduta::map::file::{FileError, MapReader};
+use veduta::map::{Camera, Faces, Origin, SeenScene, SeenSpans, TooFewSubScanlines};
+use veduta::pipeline::{self, Shortcoming};
 use veduta::scene::Scene;
-use veduta_io::{OpenMap, change_scene, is_map, open_map, set_in_scene};
+use veduta_io::{
+    MapFileError, OpenMap, Warning, change_scene, is_map, open_map, set_in_scene, write_map,
+    write_spans,
+};
 
 /// Opens a stored map; a file of another kind is refused with what to do.
 pub fn open(path: &Path) -> Result<OpenMap, Failure> {
@@ -77,8 +84,8 @@ pub fn laid_on(
 }
 
 /// Fails for a filter that reaches beyond the pixels into which guests are laid.
-pub fn refuse_filter_of_guests(file: &Path, seen: &SeenScene, look: &Look) -> Result<(), Failure> {
-    if seen.guests.is_empty() {
+pub fn refuse_filter_of_guests(file: &Path, seen: &Stored, look: &Look) -> Result<(), Failure> {
+    if !matches!(seen, Stored::Regions(seen) if !seen.guests.is_empty()) {
         return Ok(());
     }
     let why = "pictures of other programs are laid into pixels by area";
@@ -93,7 +100,8 @@ pub fn refusal(error: &CompositeError, files: &[&Path]) -> Failure {
             files[*index].display(),
             files[0].display()
         ),
-        CompositeError::OtherWorld { index, difference } => format!(
+        CompositeError::OtherWorld { index, difference }
+        | CompositeError::OtherSampling { index, difference } => format!(
             "{}: cannot be composited with {}: {difference}",
             files[*index].display(),
             files[0].display()
@@ -125,8 +133,25 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Changes the materials: first as the file says, then as the command line does.
+    /// Changes the materials: first as the file says, then as the command line does. Warns of what cannot
+    /// be done; if strict, fails.
     pub fn apply(&self, scene: &mut Scene, strict: bool, talk: &mut Talk) -> Result<(), Failure> {
+        for warning in self.change(scene)? {
+            if strict {
+                let message = format!("{warning} (an error because of --strict)");
+                return Err(Failure::new(Code::BadInput, message));
+            }
+            talk.warn(warning.to_string());
+        }
+        Ok(())
+    }
+
+    /// The same for what casts shadows of a scene that was told all warnings.
+    pub fn apply_to_casters(&self, scene: &mut Scene) -> Result<(), Failure> {
+        self.change(scene).map(|_| ())
+    }
+
+    fn change(&self, scene: &mut Scene) -> Result<Vec<Warning>, Failure> {
         let mut warnings = Vec::new();
         if let Some(path) = &self.changes {
             let text = std::fs::read(path).map_err(|error| {
@@ -138,14 +163,7 @@ impl Changes {
         for line in &self.set {
             warnings.extend(set_in_scene(scene, line)?);
         }
-        for warning in warnings {
-            if strict {
-                let message = format!("{warning} (an error because of --strict)");
-                return Err(Failure::new(Code::BadInput, message));
-            }
-            talk.warn(warning.to_string());
-        }
-        Ok(())
+        Ok(warnings)
     }
 }
 
@@ -162,12 +180,114 @@ pub fn refuse_place(path: &Path, force: bool) -> Result<(), Failure> {
     refuse_to_replace(path, force)
 }
 
-/// How many faces and pieces a map has, for people.
-pub fn summary(seen: &SeenScene) -> String {
-    let count = seen.map.opaque.len() + seen.map.veils.len();
-    format!(
-        "{} faces seen in {count} fragments, of {} objects",
-        seen.map.faces.len(),
-        seen.scene.objects.len()
-    )
+/// What a stored map holds.
+#[derive(Debug)]
+pub enum Stored {
+    /// Regions, found exactly.
+    Regions(SeenScene),
+    /// Spans on sub-scanlines, which multiscan found.
+    Spans(SeenSpans),
+}
+
+impl Stored {
+    /// Reads all of a map.
+    pub fn read(map: &mut OpenMap) -> Result<Self, MapFileError> {
+        match map.reader().sub_scanlines_per_row() {
+            None => map.read(|reader| reader.read()).map(Self::Regions),
+            Some(_) => map.read(|reader| reader.read_spans()).map(Self::Spans),
+        }
+    }
+
+    /// [`Stored::read`], with every byte and all that it says checked.
+    pub fn check(map: &mut OpenMap) -> Result<Self, MapFileError> {
+        match map.reader().sub_scanlines_per_row() {
+            None => map.read(|reader| reader.check()).map(Self::Regions),
+            Some(_) => map.read(|reader| reader.check_spans()).map(Self::Spans),
+        }
+    }
+
+    /// Writes it into a file of its own.
+    pub fn write(&self, place: &Path, origin: &Origin) -> Result<(), MapFileError> {
+        match self {
+            Self::Regions(seen) => write_map(place, seen, origin),
+            Self::Spans(seen) => write_spans(place, seen, origin),
+        }
+    }
+
+    /// The faces seen.
+    pub fn faces(&self) -> &Faces {
+        match self {
+            Self::Regions(seen) => &seen.map.faces,
+            Self::Spans(seen) => &seen.faces,
+        }
+    }
+
+    /// What is seen of the scene.
+    pub fn scene(&self) -> &Scene {
+        match self {
+            Self::Regions(seen) => &seen.scene,
+            Self::Spans(seen) => &seen.scene,
+        }
+    }
+
+    /// The same, to be changed.
+    pub fn scene_mut(&mut self) -> &mut Scene {
+        match self {
+            Self::Regions(seen) => &mut seen.scene,
+            Self::Spans(seen) => &mut seen.scene,
+        }
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        match self {
+            Self::Regions(seen) => &seen.map.camera,
+            Self::Spans(seen) => &seen.camera,
+        }
+    }
+
+    /// Width and height in pixels of the picture it was made for.
+    pub fn size(&self) -> [u32; 2] {
+        match self {
+            Self::Regions(seen) => seen.size,
+            Self::Spans(seen) => [seen.spans.width(), seen.spans.height()],
+        }
+    }
+
+    /// The picture of it, and the channels beside the light. Spans have no other filter than the box.
+    pub fn picture(
+        &self,
+        grid: &PixelGrid,
+        unlit: bool,
+        filter: Filter,
+        aovs: AovSettings,
+    ) -> Result<(Picture, Aovs), TooFewSubScanlines> {
+        match self {
+            Self::Regions(seen) => Ok(pipeline::render_seen(seen, grid, unlit, filter, aovs)),
+            Self::Spans(seen) => pipeline::render_spans(seen, grid, unlit, aovs),
+        }
+    }
+
+    /// What a picture of it does not show as it should.
+    pub fn shortcomings(&self) -> Vec<Shortcoming> {
+        match self {
+            Self::Regions(seen) => pipeline::shortcomings(&seen.scene, &seen.map),
+            Self::Spans(seen) => pipeline::shortcomings_of_spans(seen),
+        }
+    }
+
+    /// How many faces and pieces it has, for people.
+    pub fn summary(&self) -> String {
+        let (faces, objects) = (self.faces().len(), self.scene().objects.len());
+        let pieces = match self {
+            Self::Regions(SeenScene { map, .. }) => {
+                format!("{} fragments", map.opaque.len() + map.veils.len())
+            }
+            Self::Spans(SeenSpans { spans, .. }) => {
+                let n = spans.sub_scanlines_per_row();
+                format!("{} spans on {n} sub-scanlines a row", spans.len())
+            }
+        };
+        format!("{faces} faces seen in {pieces}, of {objects} objects")
+    }
 }

@@ -1,4 +1,4 @@
-//! `veduta render --deep`: deep pictures as users meet them.
+//! `veduta render --deep` and `veduta shade --deep`: deep pictures as users meet them.
 
 use crate::{FACING, Folder};
 use predicates::str::contains;
@@ -22,6 +22,77 @@ fn a_deep_picture_lays_flat_to_the_flat_one() {
             let largest = found["max"].as_f64().unwrap_or(0.0);
             assert!(largest <= most, "{view} {how}: {found}");
         }
+    }
+}
+
+#[test]
+fn a_stored_map_gives_the_deep_picture_of_its_scene() {
+    let folder = Folder::new();
+    for view in [FACING, "--eye 3,-5,2 --size 61x47"] {
+        let render = format!("render town.obj {view}");
+        folder.told(&format!("{render} -o expected.exr --deep"));
+        folder.told(&format!("{render} -o town.veduta --force"));
+        let told = folder.json("shade town.veduta -o found.exr --deep");
+        assert!(told["samples"].as_u64() > Some(0), "{told}");
+        assert_eq!(told["facesProjected"], 0, "nothing is found anew");
+        assert!(
+            folder.read("expected.exr") == folder.read("found.exr"),
+            "{view}"
+        );
+    }
+    // A part of it, enlarged, in another colour.
+    let part = "--scale 2.5 --window 20.5,30,70,50 --set material.red.color=#446";
+    folder.told(&format!("shade town.veduta {part} -o flat.exr"));
+    folder.told(&format!("shade town.veduta {part} -o deep.exr --deep"));
+    let found = folder.json("diff flat.exr deep.exr --tolerance 10");
+    assert!(found["max"].as_f64().unwrap_or(0.0) < 1e-6, "{found}");
+    for (arguments, word) in [
+        ("-o a.png --deep", "stored as .exr"),
+        ("-o a.svg --deep", "stored as .exr"),
+        ("-o a.exr --deep --tone none", "--tone"),
+        ("-o a.exr --deep --filter triangle", "leave --filter out"),
+    ] {
+        let mut refused = folder.veduta(&format!("shade town.veduta {arguments}"));
+        refused.assert().code(2).stderr(contains(word));
+    }
+}
+
+#[test]
+fn openimageio_lays_our_deep_pictures_flat_as_we_do() {
+    let folder = Folder::new();
+    folder.told("render town.obj --eye 3,-5,2 --size 61x47 -o town.veduta");
+    folder.told("shade town.veduta -o flat.exr");
+    for how in ["zips", "rle", "none"] {
+        folder.told(&format!(
+            "shade town.veduta -o deep.exr --deep --compression {how}"
+        ));
+        let flatten = std::process::Command::new("oiiotool")
+            .current_dir(folder.place())
+            .args([
+                "deep.exr",
+                "--flatten",
+                "--ch",
+                "R,G,B,A",
+                "-d",
+                "float",
+                "-o",
+                "theirs.exr",
+            ])
+            .output();
+        let flatten = match flatten {
+            Ok(flatten) => flatten,
+            Err(error) => {
+                println!("skipped: oiiotool, of OpenImageIO, cannot be run: {error}");
+                return;
+            }
+        };
+        let said = String::from_utf8_lossy(&flatten.stderr).into_owned();
+        assert!(flatten.status.success(), "{how}: {said}");
+        let found = folder.json("diff flat.exr theirs.exr --tolerance 10");
+        assert!(
+            found["max"].as_f64().expect("a number") < 1e-5,
+            "{how}: {found}"
+        );
     }
 }
 

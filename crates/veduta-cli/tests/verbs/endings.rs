@@ -1,6 +1,6 @@
 //! However it ends, no partial file is left.
 
-use crate::{Folder, program};
+use crate::{FACING, Folder, program};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
@@ -50,6 +50,58 @@ fn killed_while_it_writes_it_leaves_no_partial_file() {
             assert!(left.is_empty(), "SIG{signal}: {left:?}");
         }
     }
+}
+
+/// Runs `veduta` with a limit on the size of files, of 512 or 1024 bytes each block, in a shell.
+#[cfg(unix)]
+fn limited(folder: &Folder, blocks: usize, before: &str, arguments: &str) -> std::process::Output {
+    let script = format!("{before} ulimit -f {blocks} && exec \"$0\" {arguments}");
+    let run = Command::new("sh")
+        .current_dir(folder.place())
+        .args(["-c", &script])
+        .arg(program())
+        .output();
+    run.expect("there is a shell")
+}
+
+#[cfg(unix)]
+#[test]
+fn a_map_that_cannot_be_written_to_its_end_leaves_the_old_one() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = Folder::new();
+    folder.told("examples radial -o radial.obj");
+    let render = format!("render radial.obj {FACING} --self-contained --force -o town.veduta");
+    folder.told(&render);
+    let new = folder.read("town.veduta");
+    folder.told(&format!("render town.obj {FACING} --force -o town.veduta"));
+    let (old, before) = (folder.read("town.veduta"), folder.files());
+    for blocks in [0, 1, 4, new.len() / 1024 - 1] {
+        // Who writes beyond the limit is ended by a signal, as by a kill in the midst of it.
+        let killed = limited(&folder, blocks, "", &render);
+        // Or, where that is ignored, told that there is no room.
+        let refused = limited(&folder, blocks, "trap '' XFSZ;", &render);
+        assert_eq!(
+            folder.files(),
+            before,
+            "{blocks} blocks: nothing is left over"
+        );
+        assert!(
+            folder.read("town.veduta") == old,
+            "{blocks} blocks: the old map is there"
+        );
+        assert!(
+            killed.status.signal().is_some(),
+            "{blocks} blocks: {killed:?}"
+        );
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(6), "{blocks} blocks: {said}");
+        assert!(said.contains("town.veduta: "), "{blocks} blocks: {said}");
+    }
+    folder.told(&render);
+    assert!(
+        folder.read("town.veduta") == new,
+        "without a limit it is written"
+    );
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The verbs, pictures and pipes as users meet them.
 
+mod casters;
 mod check;
 mod deep;
 mod diff;
@@ -12,6 +13,7 @@ mod pictures;
 mod pipes;
 mod preview;
 mod readme;
+mod spans;
 mod stored;
 
 use assert_cmd::Command;

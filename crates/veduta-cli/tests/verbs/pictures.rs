@@ -251,7 +251,7 @@ fn a_stored_map_has_the_same_channels() {
     for (arguments, message) in [
         (
             "render town.obj -o a.veduta --aov depth",
-            "--aov, --deep and --sampling are not for .veduta",
+            "--aov and --deep are not for .veduta",
         ),
         (
             "composite kept.veduta -o a.veduta --aov depth",

@@ -1,6 +1,7 @@
 use super::error::Problem;
+use super::files::ReadFiles;
 
-/// How much memory the input read so far can justify.
+/// The input read so far, and how much memory it can justify.
 ///
 /// A few bytes of JSON can ask for any number of vertices, and a thousand primitives can share one
 /// accessor, so every table is charged here before it is made.
@@ -8,6 +9,8 @@ use super::error::Problem;
 pub(crate) struct Budget {
     input: u64,
     spent: u64,
+    /// What was read.
+    pub files: ReadFiles,
 }
 
 /// Bytes that any file may ask for, however small.
@@ -20,7 +23,11 @@ const PER_INPUT_BYTE: u64 = 64;
 
 impl Budget {
     pub fn new() -> Self {
-        Self { input: 0, spent: 0 }
+        Self {
+            input: 0,
+            spent: 0,
+            files: ReadFiles::default(),
+        }
     }
 
     /// Says that `bytes` of input have been read.

@@ -55,6 +55,7 @@ use error::{Fault, Warnings};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
+use veduta::map::Source;
 use veduta::scene::Scene;
 
 /// The axis of a file that points upwards.
@@ -84,6 +85,8 @@ pub struct Loaded {
     pub scene: Scene,
     /// What a user should know.
     pub warnings: Vec<Warning>,
+    /// The files that it was read from, each once; the first is the one that was named.
+    pub files: Vec<Source>,
     /// Name of the camera that a scene file means to be used where none is asked for.
     pub default_camera: Option<String>,
     /// Widths and heights in pixels that cameras of a scene file mean their pictures to have, by the
@@ -146,10 +149,12 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadErro
 /// Reads a scene from a file that is no scene file.
 fn read_model(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut warnings = Warnings::new(path.to_owned());
-    let scene = read(path, options, &mut warnings).map_err(|fault| fault.of(path))?;
+    let mut budget = Budget::new();
+    let scene = read(path, options, &mut budget, &mut warnings);
     Ok(Loaded {
-        scene,
+        scene: scene.map_err(|fault| fault.of(path))?,
         warnings: warnings.finish(),
+        files: budget.files.finish(),
         default_camera: None,
         picture_sizes: Vec::new(),
     })
@@ -218,7 +223,12 @@ impl Format {
     }
 }
 
-fn read(path: &Path, options: &ReadOptions, warnings: &mut Warnings) -> Result<Scene, Fault> {
+fn read(
+    path: &Path,
+    options: &ReadOptions,
+    budget: &mut Budget,
+    warnings: &mut Warnings,
+) -> Result<Scene, Fault> {
     let whole = |problem: Problem| problem.at(Place::Whole);
     let Some(format) = Format::of(path).map_err(whole)? else {
         let known: Vec<_> = SCENE_SUFFIXES.iter().map(|s| format!(".{s}")).collect();
@@ -226,21 +236,21 @@ fn read(path: &Path, options: &ReadOptions, warnings: &mut Warnings) -> Result<S
         return Err(whole(Problem::UnknownFormat { known }));
     };
     let bytes = std::fs::read(path).map_err(|error| whole(Problem::Unreadable(error)))?;
-    let mut budget = Budget::new();
+    budget.files.add(path, &bytes);
     budget.add_input(bytes.len());
     let mut scene = match format {
         #[cfg(feature = "gltf")]
-        Format::Gltf => gltf::read(path, &bytes, &mut budget, warnings)?,
+        Format::Gltf => gltf::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "obj")]
-        Format::Obj => obj::read(path, &bytes, &mut budget, warnings)?,
+        Format::Obj => obj::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "ply")]
-        Format::Ply => ply::read(path, &bytes, &mut budget, warnings)?,
+        Format::Ply => ply::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "stl")]
-        Format::Stl => stl::read(path, &bytes, &mut budget, warnings)?,
+        Format::Stl => stl::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "cityjson")]
         Format::CityJson => {
             let level = options.level_of_detail;
-            cityjson::read(path, &bytes, level, &mut budget, warnings)?
+            cityjson::read(path, &bytes, level, budget, warnings)?
         }
     };
     let up = options.up_axis.unwrap_or_else(|| format.usual_up());

@@ -2,9 +2,10 @@
 //!
 //! `VEDUTA_DAMAGE=20` makes twenty times as many cases.
 
-use crate::{PACKINGS, Random, encoded, formula};
+use crate::{OneFile, PACKINGS, Random, depth_pictures, encoded, formula};
 use peak_alloc::PeakAlloc;
 use veduta_io::deep_exr::{DeepFile, DeepProblem};
+use veduta_io::depth_picture::{DepthOptions, read_depth_picture};
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
@@ -121,6 +122,48 @@ fn numbers_beyond_reason_are_refused_without_being_believed() {
                 }
             }
             refused += usize::from(read(&bytes, &format!("{name}, case {case}")).is_err());
+        }
+        assert!(refused > cases / 4, "{name}: {refused} of {cases}");
+    }
+}
+
+#[test]
+fn damaged_pictures_with_depths_are_read_or_refused() {
+    let options = DepthOptions::default();
+    let file = OneFile::new("depth.exr");
+    for (name, sound) in depth_pictures::sound_files() {
+        let read = |bytes: &[u8], case: &str| {
+            file.write(bytes);
+            let read = read_depth_picture(&file.path, &options);
+            if let Err(error) = &read {
+                let message = error.to_string();
+                assert!(
+                    message.len() < 1000 && !message.contains('\n'),
+                    "{name}, {case}: {message}"
+                );
+            }
+            let peak = MEMORY.peak_usage();
+            assert!(peak < MOST_MEMORY, "{name}, {case}: {peak} bytes");
+            read.is_ok()
+        };
+        assert!(read(&sound, "sound"));
+        let mut random = Random(1);
+        let (mut refused, cases) = (0, 800 * effort());
+        for case in 0..cases {
+            let mut bytes = sound.clone();
+            for _ in 0..=random.below(3) {
+                let at = random.below(bytes.len());
+                match random.below(4) {
+                    0 => bytes[at..].iter_mut().take(4).for_each(|byte| *byte = 0xff),
+                    1 => bytes[at] = [0, 1, 0x7f, 0x80, 0xff][random.below(5)],
+                    2 => bytes.truncate(at.max(1)),
+                    _ => bytes[at] ^= 1 << random.below(8),
+                }
+                if bytes.len() < 8 {
+                    break;
+                }
+            }
+            refused += usize::from(!read(&bytes, &format!("case {case}")));
         }
         assert!(refused > cases / 4, "{name}: {refused} of {cases}");
     }

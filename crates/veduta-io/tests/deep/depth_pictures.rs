@@ -51,6 +51,37 @@ fn layer(name: &str, channels: Vec<(&str, Vec<f32>)>) -> OwnLayer {
     )
 }
 
+/// Files of all kinds that are read: with a camera and without, in parts, in blocks and lines.
+pub fn sound_files() -> Vec<(String, Vec<u8>)> {
+    let mut files = Vec::new();
+    for compression in [
+        Compression::Uncompressed,
+        Compression::RLE,
+        Compression::ZIP1,
+        Compression::PIZ,
+    ] {
+        for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(4, 3))] {
+            let mut channels = colors();
+            channels.push(("Z", (0..WIDTH * HEIGHT).map(depth_at).collect()));
+            let mut layer = layer("", channels);
+            layer.encoding.compression = compression;
+            layer.encoding.blocks = blocks;
+            let mut image = Image::from_layer(layer);
+            let [world_to_camera, world_to_ndc] = matrices_of_camera(&camera());
+            let attributes = &mut image.layer_data.attributes;
+            attributes.world_to_camera = Some(world_to_camera);
+            attributes.world_to_normalized_device = Some(world_to_ndc);
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            image
+                .write()
+                .to_buffered(&mut bytes)
+                .expect("memory takes all");
+            files.push((format!("{compression:?}, {blocks:?}"), bytes.into_inner()));
+        }
+    }
+    files
+}
+
 fn colors() -> Vec<(&'static str, Vec<f32>)> {
     ["R", "G", "B", "A"]
         .into_iter()

@@ -4,7 +4,7 @@
 
 use crate::{OneFile, encoded, sample_picture};
 use peak_alloc::PeakAlloc;
-use veduta_io::{PICTURE_SUFFIXES, PictureOptions, Samples, read_picture};
+use veduta_io::{ExrCompression, PICTURE_SUFFIXES, PictureOptions, Samples, read_picture};
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
@@ -116,13 +116,24 @@ fn damaged_pictures_of_rarer_kinds_are_read_or_refused() {
         ..PictureOptions::default()
     };
     damage_all_ways("tif", &floats);
-    let tiles = PictureOptions {
-        samples: Some(Samples::F16),
-        exr_compression: veduta_io::ExrCompression::Piz,
-        exr_tile: Some(16),
-        ..PictureOptions::default()
-    };
-    damage_all_ways("exr", &tiles);
+}
+
+#[test]
+fn damaged_exr_of_all_compressions_and_layouts_is_read_or_refused() {
+    use ExrCompression::{None, Piz, Rle, Zip, Zips};
+    for exr_compression in [None, Rle, Zips, Zip, Piz] {
+        for exr_tile in [Option::None, Some(16)] {
+            for samples in [Samples::F16, Samples::F32] {
+                let options = PictureOptions {
+                    samples: Some(samples),
+                    exr_compression,
+                    exr_tile,
+                    ..PictureOptions::default()
+                };
+                damage_all_ways("exr", &options);
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What the readers make of files: sound ones, wrong ones, damaged ones and real ones.
 
+mod casters;
 mod cityjson;
 #[cfg(feature = "meshopt")]
 mod compressed;

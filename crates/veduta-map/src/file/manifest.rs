@@ -2,17 +2,18 @@
 
 use super::FileError;
 use crate::scene::{Layer, Light, Material, World};
-use crate::{Camera, GuestGrid, GuestKind};
+use crate::{Camera, GuestGrid, GuestKind, Reading, Source};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::io::{self, Read};
-use xxhash_rust::xxh3::Xxh3;
 
 /// Name of the member.
 pub const MANIFEST: &str = "manifest.json";
 
 /// What the format calls itself.
 pub const FORMAT: &str = "veduta visibility map";
+
+/// What it calls itself where it holds spans of multiscan: programs that know only maps refuse it.
+pub const SPANS_FORMAT: &str = "veduta multiscan spans";
 
 /// Major version: readers refuse others. Minor version: readers skip what they do not know.
 pub const VERSION: [u32; 2] = [1, 1];
@@ -37,6 +38,13 @@ pub struct Manifest {
     pub lights: Vec<Light>,
     pub materials: Vec<Material>,
     pub sources: Vec<Source>,
+    /// Sub-scanlines of a row of pixels, in a file that holds spans in place of regions; since version
+    /// 1.1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sub_scanlines: Option<u32>,
+    /// What casts shadows; since version 1.1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub casters: Option<CastersTold>,
     /// Pictures of other programs; since version 1.1.
     #[serde(default)]
     pub guests: Vec<GuestEntry>,
@@ -57,40 +65,27 @@ pub struct GuestEntry {
     pub objects: Vec<String>,
 }
 
-/// A file that the scene was read from.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Source {
-    /// As it was named; relative to the map where it can be.
-    pub path: String,
-    /// Number of bytes.
-    pub length: u64,
-    /// XXH3 of the bytes, 128 bits, hexadecimal.
-    pub xxh3: String,
+/// What casts, as far as it is not in tables.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CastersTold {
+    /// Of the scene in the tables `caster-*.arrow`; `None` if there are none.
+    #[serde(default)]
+    pub embedded: Option<EmbeddedScene>,
+    #[serde(default)]
+    pub readings: Vec<Reading>,
 }
 
-impl Source {
-    /// What is to be said of a file with these contents.
-    ///
-    /// # Errors
-    /// Those of `contents`.
-    pub fn of(path: &str, mut contents: impl Read) -> io::Result<Self> {
-        let mut checksum = Xxh3::new();
-        let mut length = 0;
-        let mut buffer = vec![0; 1 << 16];
-        loop {
-            let read = contents.read(&mut buffer)?;
-            if read == 0 {
-                break;
-            }
-            checksum.update(&buffer[..read]);
-            length += read as u64;
-        }
-        Ok(Self {
-            path: path.to_owned(),
-            length,
-            xxh3: format!("{:032x}", checksum.digest128()),
-        })
-    }
+/// What the tables do not tell of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EmbeddedScene {
+    pub world: World,
+    pub layers: Vec<Layer>,
+    pub lights: Vec<Light>,
+    pub cameras: Vec<(String, Camera)>,
+    pub materials: Vec<Material>,
+    /// Of each image its row in `images.arrow`, in which those of what is seen stand, or, counted on
+    /// from the last of these, in `caster-images.arrow`.
+    pub images: Vec<u32>,
 }
 
 /// Where the batches of a table lie, and their checksums. A table's bytes are its head (Arrow's schema),
@@ -134,7 +129,7 @@ impl Manifest {
             what: error.to_string(),
         };
         let Versioned { format, version } = serde_json::from_slice(bytes).map_err(unsound)?;
-        if format != FORMAT {
+        if format != FORMAT && format != SPANS_FORMAT {
             let what = format!("the format is {format:?}, not {FORMAT:?}");
             return Err(FileError::Unsound {
                 member: MANIFEST.into(),

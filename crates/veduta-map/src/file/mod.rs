@@ -3,7 +3,10 @@
 //! A file is a ZIP archive whose members are stored as they are: Arrow IPC files, each a table, and
 //! `manifest.json`, written last. docs/format.md tells the columns and how to read them from Python.
 //!
-//! - `tables` are the columns, `guests` those of pictures of other programs; `tiles` says which rows stand together, so that a window of the picture
+//! - `casters` keeps, where that is asked for, what the map does not show but what casts shadows.
+//! - `spans` is what multiscan found, in a file of another kind: in place of regions.
+//! - `guests` are pictures of other programs.
+//! - `tables` are the columns; `tiles` says which rows stand together, so that a window of the picture
 //!   reads little; `container` is the archive, `manifest` what else there is to know.
 //! - Every byte is under a checksum, or is compared with its only legal value, before it is decoded:
 //!   damage is an error that says where, never another picture.
@@ -12,17 +15,20 @@
 //! Writing goes through the tables one after the other, reading through the tiles, so that neither
 //! holds more than the map itself and a tile of the file.
 
+mod casters;
 mod container;
 mod guests;
 mod manifest;
+mod message;
 mod read;
+mod spans;
 mod tables;
 mod tiles;
 mod write;
 
-pub use manifest::{Source, VERSION};
+pub use manifest::VERSION;
 pub use read::MapReader;
-pub use write::write_map;
+pub use write::{write_map, write_spans};
 
 /// Why a file could not be read or written. The caller knows which file.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +72,14 @@ pub enum FileError {
         /// Major and minor version of the file.
         found: [u32; 2],
     },
+    /// It holds something else than what is asked for.
+    #[error("holds {found}; what is asked for needs {expected}")]
+    OtherContents {
+        /// What is in it.
+        found: &'static str,
+        /// What was looked for.
+        expected: &'static str,
+    },
     /// Sound bytes that say what cannot be: not from this program.
     #[error("{member}: {what}")]
     Unsound {
@@ -89,5 +103,7 @@ impl FileError {
     }
 }
 
+#[cfg(test)]
+mod forged;
 #[cfg(test)]
 mod tests;

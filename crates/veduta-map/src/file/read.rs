@@ -1,23 +1,29 @@
 //! A file -> a seen scene, whole or a window of it.
 
 use super::FileError;
+use super::casters;
 use super::container::{ArchiveReader, Member};
 use super::guests;
-use super::manifest::{MANIFEST, Manifest, Segment, Source, Table};
+use super::manifest::{MANIFEST, Manifest, SPANS_FORMAT, Segment, Table};
+use super::message;
+use super::spans;
 use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
 use crate::scene::{Mesh, MeshId, Object, Scene};
 use crate::{
-    Camera, FaceId, Faces, Fragments, Guest, GuestSamples, MaterialId, ObjectId, PlaneId,
-    SeenScene, Side, VisibilityMap,
+    Camera, FaceId, Faces, Fragments, Guest, GuestSamples, MaterialId, ObjectId, PlaneId, Reading,
+    SeenScene, SeenSpans, Side, Source, VisibilityMap,
 };
 use arrow_array::RecordBatch;
+use arrow_ipc::MetadataVersion;
 use arrow_ipc::reader::FileDecoder;
-use arrow_ipc::{Block, MetadataVersion};
 use arrow_schema::SchemaRef;
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::sync::Arc;
 use veduta_geometry::{Affine, DVec2};
+
+/// All heights of the image plane.
+const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Reads a file, all of it or what a window needs.
 #[derive(Debug)]
@@ -60,18 +66,17 @@ impl<R: Read + Seek> MapReader<R> {
                 return unsound(format!("the parts of {} are not all of it", member.name));
             }
         }
-        for table in self.tables() {
-            let name = table.member();
+        for name in self.known_tables() {
             let (Some(_), Some(found)) =
                 (self.archive.member(name), self.manifest.tables.get(name))
             else {
                 return unsound(format!("{name} is missing"));
             };
-            let of_tiles = TableName::OF_TILES.contains(&table);
-            if of_tiles && found.batches.len() != self.manifest.tiles.len() {
+            let is_of_tiles = self.of_tiles().iter().any(|table| table.member() == name);
+            if is_of_tiles && found.batches.len() != self.manifest.tiles.len() {
                 return unsound(format!("{name} does not have a batch for each tile"));
             }
-            let of_guests = TableName::OF_GUESTS.contains(&table);
+            let of_guests = TableName::OF_GUESTS.map(TableName::member).contains(&name);
             let bands = self
                 .manifest
                 .guests
@@ -81,18 +86,45 @@ impl<R: Read + Seek> MapReader<R> {
                 return unsound(format!("{name} does not have a batch for each band"));
             }
         }
+        if self.manifest.sub_scanlines.is_some() != (self.manifest.format == SPANS_FORMAT) {
+            return unsound("it is of spans and not of spans".into());
+        }
+        if !self.manifest.camera.is_sound() {
+            return unsound("the camera shows nothing: a number of it is 0 or negative".into());
+        }
         if self.manifest.size.contains(&0) {
             return unsound("the picture has no pixels".into());
         }
         Ok(())
     }
 
-    /// The tables that must be there.
-    fn tables(&self) -> impl Iterator<Item = TableName> + use<R> {
-        let of_guests = (!self.manifest.guests.is_empty()).then_some(TableName::OF_GUESTS);
-        TableName::ALL
-            .into_iter()
-            .chain(of_guests.into_iter().flatten())
+    /// The members whose tables this program knows of, all of which must be there.
+    fn known_tables(&self) -> Vec<&'static str> {
+        let is_of_spans = self.sub_scanlines_per_row().is_some();
+        let mut names = self.of_tiles().to_vec();
+        names.extend([TableName::Objects, TableName::Images]);
+        let mut names: Vec<_> = names.into_iter().map(TableName::member).collect();
+        names.extend(is_of_spans.then_some(spans::MEMBER));
+        if !self.manifest.guests.is_empty() {
+            names.extend(TableName::OF_GUESTS.map(TableName::member));
+        }
+        if self.has_embedded_casters() {
+            names.extend(casters::members());
+        }
+        names
+    }
+
+    /// The tables whose batches are tiles.
+    fn of_tiles(&self) -> &'static [TableName] {
+        match self.sub_scanlines_per_row() {
+            None => &TableName::OF_TILES,
+            Some(_) => &TableName::OF_FACES,
+        }
+    }
+
+    /// What is in the file and where.
+    pub(super) fn manifest(&self) -> &Manifest {
+        &self.manifest
     }
 
     /// Pixels of the picture that the map was made for.
@@ -115,10 +147,26 @@ impl<R: Read + Seek> MapReader<R> {
         &self.manifest.sources
     }
 
-    /// What is in the file and where.
-    #[cfg(test)]
-    pub(super) fn manifest(&self) -> &Manifest {
-        &self.manifest
+    /// Sub-scanlines of a row of pixels, if the file holds spans of multiscan in place of regions.
+    pub fn sub_scanlines_per_row(&self) -> Option<u32> {
+        self.manifest.sub_scanlines
+    }
+
+    /// Whether the file tells what casts, itself or by naming files.
+    pub fn tells_casters(&self) -> bool {
+        self.manifest.casters.is_some()
+    }
+
+    /// Whether casters are kept in the file itself.
+    pub fn has_embedded_casters(&self) -> bool {
+        let casters = self.manifest.casters.as_ref();
+        casters.is_some_and(|casters| casters.embedded.is_some())
+    }
+
+    /// How casters are read again that the file does not hold itself.
+    pub fn readings(&self) -> &[Reading] {
+        let casters = self.manifest.casters.as_ref();
+        casters.map_or(&[], |casters| &casters.readings)
     }
 
     /// Bytes read so far.
@@ -131,10 +179,23 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`].
     pub fn read(&mut self) -> Result<SeenScene, FileError> {
-        self.read_tiles(
-            0..self.manifest.tiles.len(),
-            [f64::NEG_INFINITY, f64::INFINITY],
-        )
+        self.refuse_spans()?;
+        self.read_tiles(0..self.manifest.tiles.len(), EVERYWHERE)
+    }
+
+    /// Reads the faces of a file of spans, as a map of which nothing is seen.
+    pub(super) fn read_faces(&mut self) -> Result<SeenScene, FileError> {
+        self.read_tiles(0..self.manifest.tiles.len(), EVERYWHERE)
+    }
+
+    fn refuse_spans(&self) -> Result<(), FileError> {
+        match self.sub_scanlines_per_row() {
+            None => Ok(()),
+            Some(_) => Err(FileError::OtherContents {
+                found: "spans of multiscan",
+                expected: "regions, found exactly",
+            }),
+        }
     }
 
     /// Reads what is seen in a window of the image plane, from its left top corner to its right bottom
@@ -143,6 +204,7 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`].
     pub fn read_window(&mut self, [min, max]: [DVec2; 2]) -> Result<SeenScene, FileError> {
+        self.refuse_spans()?;
         let touches = |&[left, top, right, bottom]: &[f64; 4]| {
             left <= max.x && right >= min.x && top <= max.y && bottom >= min.y
         };
@@ -164,18 +226,35 @@ impl<R: Read + Seek> MapReader<R> {
     /// # Errors
     /// [`FileError`], or what the map itself has against it.
     pub fn check(&mut self) -> Result<SeenScene, FileError> {
-        for member in self.archive.members().to_vec() {
-            self.archive.check(&member)?;
-        }
-        for table in self.tables() {
-            let (_, member, found) = self.table(table)?;
-            let (start, head) = (member.start(), found.head.clone());
-            self.segment(table, start, &head)?;
-        }
+        self.refuse_spans()?;
+        self.check_tables()?;
         let seen = self.read()?;
         let sound = seen.map.check();
         sound.map_err(|invariant| FileError::unsound("the map", invariant.to_string()))?;
         Ok(seen)
+    }
+
+    /// [`MapReader::check`] of a file that holds what multiscan found.
+    ///
+    /// # Errors
+    /// [`FileError`].
+    pub fn check_spans(&mut self) -> Result<SeenSpans, FileError> {
+        self.check_tables()?;
+        self.read_spans()
+    }
+
+    /// Compares every byte with its checksum, and reads what casts.
+    fn check_tables(&mut self) -> Result<(), FileError> {
+        for member in self.archive.members().to_vec() {
+            self.archive.check(&member)?;
+        }
+        for table in self.known_tables() {
+            let (member, found) = self.table(table)?;
+            let (start, head) = (member.start(), found.head.clone());
+            self.segment(table, start, &head)?;
+        }
+        self.read_casters()?;
+        Ok(())
     }
 
     /// Reads tiles, and guests between two heights of the image plane.
@@ -186,8 +265,8 @@ impl<R: Read + Seek> MapReader<R> {
     ) -> Result<SeenScene, FileError> {
         let mut rows = SeenRows::default();
         let mut of_tiles = Vec::new();
-        for table in TableName::OF_TILES {
-            of_tiles.push(TableReader::new(self, table)?);
+        for &table in self.of_tiles() {
+            of_tiles.push(TableReader::new(self, table.member())?);
         }
         for tile in tiles {
             let mut batches = Vec::with_capacity(of_tiles.len());
@@ -202,9 +281,11 @@ impl<R: Read + Seek> MapReader<R> {
             let points = of(TableName::Points).points()?;
             rows.faces.extend(of(TableName::Faces).faces(&points)?);
             rows.vertices.extend(of(TableName::Vertices).vertices()?);
-            rows.opaque
-                .extend(of(TableName::Opaque).fragments(&points)?);
-            rows.veils.extend(of(TableName::Veils).fragments(&points)?);
+            if of_tiles.len() == TableName::OF_TILES.len() {
+                rows.opaque
+                    .extend(of(TableName::Opaque).fragments(&points)?);
+                rows.veils.extend(of(TableName::Veils).fragments(&points)?);
+            }
         }
         let mut scene = Scene {
             materials: self.manifest.materials.clone(),
@@ -213,11 +294,11 @@ impl<R: Read + Seek> MapReader<R> {
             world: self.manifest.world.clone(),
             ..Scene::default()
         };
-        self.read_all(TableName::Images, |batch| {
+        self.read_all(TableName::Images.member(), |batch| {
             scene.images.push(batch.image()?);
             Ok(())
         })?;
-        self.read_all(TableName::Objects, |batch| {
+        self.read_all(TableName::Objects.member(), |batch| {
             for (name, world_from_object) in batch.objects()? {
                 let mesh = MeshId(scene.objects.len() as u32);
                 scene.objects.push(Object {
@@ -244,8 +325,8 @@ impl<R: Read + Seek> MapReader<R> {
             return Ok(Vec::new());
         }
         let [of_pixels, of_samples] = [
-            TableReader::new(self, TableName::GuestPixels)?,
-            TableReader::new(self, TableName::GuestSamples)?,
+            TableReader::new(self, TableName::GuestPixels.member())?,
+            TableReader::new(self, TableName::GuestSamples.member())?,
         ];
         let mut guests = Vec::new();
         let mut first_band = 0;
@@ -273,16 +354,17 @@ impl<R: Read + Seek> MapReader<R> {
         Ok(guests)
     }
 
-    fn read_all(
+    /// Reads a table, batch by batch.
+    pub(super) fn read_all(
         &mut self,
-        table: TableName,
+        member: &'static str,
         mut take: impl FnMut(Rows) -> Result<(), FileError>,
     ) -> Result<(), FileError> {
-        let reader = TableReader::new(self, table)?;
+        let reader = TableReader::new(self, member)?;
         for index in 0..reader.starts.len() {
             take(Rows {
                 batch: &reader.batch(self, index)?,
-                member: table.member(),
+                member,
                 index,
             })?;
         }
@@ -290,28 +372,27 @@ impl<R: Read + Seek> MapReader<R> {
     }
 
     /// A table's member and where its batches lie. That it is there was checked.
-    fn table(&self, name: TableName) -> Result<(TableName, &Member, &Table), FileError> {
-        let member = self.archive.member(name.member());
-        let table = self.manifest.tables.get(name.member());
-        let both = member.zip(table);
-        let (member, table) =
-            both.ok_or_else(|| FileError::unsound(name.member(), "is missing"))?;
-        Ok((name, member, table))
+    fn table(&self, name: &'static str) -> Result<(&Member, &Table), FileError> {
+        let both = self
+            .archive
+            .member(name)
+            .zip(self.manifest.tables.get(name));
+        both.ok_or_else(|| FileError::unsound(name, "is missing"))
     }
 
     /// The bytes of a part of a table, which are those that were written.
     fn segment(
         &mut self,
-        table: TableName,
+        table: &'static str,
         start: u64,
         segment: &Segment,
     ) -> Result<Vec<u8>, FileError> {
-        let bytes = self.archive.bytes(table.member(), start, segment.length)?;
+        let bytes = self.archive.bytes(table, start, segment.length)?;
         if Segment::of(&bytes) == *segment {
             Ok(bytes)
         } else {
             Err(FileError::Damaged {
-                what: table.member().into(),
+                what: table.into(),
                 offset: start,
             })
         }
@@ -329,22 +410,24 @@ impl Table {
 
 /// A table whose tail was read, in which its schema stands.
 struct TableReader {
-    name: TableName,
+    name: &'static str,
+    schema: SchemaRef,
     decoder: FileDecoder,
     /// Where each batch begins, and what its bytes are.
     starts: Vec<(u64, Segment)>,
 }
 
-/// Bytes that head a message of Arrow.
-const MESSAGE_PREFIX: usize = 8;
-
 impl TableReader {
-    fn new<R: Read + Seek>(reader: &mut MapReader<R>, name: TableName) -> Result<Self, FileError> {
-        let (_, member, table) = reader.table(name)?;
+    fn new<R: Read + Seek>(
+        reader: &mut MapReader<R>,
+        name: &'static str,
+    ) -> Result<Self, FileError> {
+        let (member, table) = reader.table(name)?;
         let (start, end, table) = (member.start(), member.end(), table.clone());
         let tail = reader.segment(name, end - table.tail.length, &table.tail)?;
         let schema = schema_of(&tail)
-            .ok_or_else(|| FileError::unsound(name.member(), "does not end with a schema"))?;
+            .ok_or_else(|| FileError::unsound(name, "does not end with a schema"))?;
+        message::check_schema(&schema).map_err(|what| FileError::unsound(name, what))?;
         let mut next = start + table.head.length;
         let starts = table.batches.into_iter().map(|segment| {
             let start = next;
@@ -354,7 +437,8 @@ impl TableReader {
         Ok(Self {
             name,
             starts: starts.collect(),
-            decoder: FileDecoder::new(schema, MetadataVersion::V5),
+            decoder: FileDecoder::new(Arc::clone(&schema), MetadataVersion::V5),
+            schema,
         })
     }
 
@@ -365,18 +449,14 @@ impl TableReader {
     ) -> Result<RecordBatch, FileError> {
         let (start, segment) = &self.starts[index];
         let bytes = reader.segment(self.name, *start, segment)?;
-        let no_batch = || FileError::unsound(self.name.member(), format!("batch {index} is none"));
-        let metadata = bytes.get(4..8).and_then(|length| length.try_into().ok());
-        let metadata = metadata.map(i32::from_le_bytes).ok_or_else(no_batch)?;
-        let metadata = usize::try_from(metadata).map_err(|_| no_batch())? + MESSAGE_PREFIX;
-        if metadata > bytes.len() {
-            return Err(no_batch());
-        }
-        let block = Block::new(0, metadata as i32, (bytes.len() - metadata) as i64);
+        let no_batch = |why: &str| {
+            let what = format!("batch {index} cannot be read: {why}");
+            FileError::unsound(self.name, what)
+        };
+        let block = message::check_batch(&bytes, &self.schema).map_err(no_batch)?;
         let batch = self.decoder.read_record_batch(&block, &bytes.into());
-        let batch =
-            batch.map_err(|error| FileError::unsound(self.name.member(), error.to_string()))?;
-        batch.ok_or_else(no_batch)
+        let batch = batch.map_err(|error| no_batch(&error.to_string()))?;
+        batch.ok_or_else(|| no_batch("it is none"))
     }
 }
 
@@ -392,7 +472,7 @@ fn schema_of(tail: &[u8]) -> Option<SchemaRef> {
 }
 
 /// What the manifest and the small tables name must be there.
-fn check_scene(scene: &Scene) -> Result<(), FileError> {
+pub(super) fn check_scene(scene: &Scene) -> Result<(), FileError> {
     let unsound = |what: String| Err(FileError::unsound(MANIFEST, what));
     let objects = scene.objects.len() as u32;
     for layer in &scene.layers {
@@ -444,6 +524,14 @@ impl SeenRows {
         {
             return Err(twice("face", pair[0].face));
         }
+        let count = self.faces.len();
+        if manifest.sub_scanlines.is_some()
+            && let Some(last) = self.faces.last()
+            && last.face as usize + 1 != count
+        {
+            let what = format!("{count} faces, but the last is {}", last.face);
+            return Err(FileError::unsound(faces, what));
+        }
         let key = |row: &VertexRow| (row.object, row.vertex);
         if let Some(pair) = self
             .vertices
@@ -456,7 +544,7 @@ impl SeenRows {
         scene.meshes = vec![Mesh::default(); scene.objects.len()];
         for row in &self.vertices {
             let mesh = scene.meshes.get_mut(row.object as usize);
-            if !mesh.is_some_and(|mesh| row.push_to(mesh)) {
+            if !mesh.is_some_and(|mesh| row.at.push_to(mesh)) {
                 let what = format!(
                     "vertex {} of object {} does not fit",
                     row.vertex, row.object
@@ -528,6 +616,10 @@ impl SeenRows {
             }
             if row.outline.len() < 3 {
                 return Err(misfit("its outline is not a polygon"));
+            }
+            // The table would turn it, and its sides would be others.
+            if !(veduta_geometry::signed_area(&row.outline) > 0.0) {
+                return Err(misfit("its outline has no area or is not wound clockwise"));
             }
             let object = ObjectId(row.object);
             let id = table.push(&row.outline, planes[&row.plane], object, source);

@@ -47,8 +47,8 @@ impl TableName {
     /// Tables whose batches are tiles, in the order in which they stand in a file.
     pub const OF_TILES: [Self; 5] = [Points, Vertices, Faces, Opaque, Veils];
 
-    /// Tables that each file has.
-    pub const ALL: [Self; 7] = [Points, Vertices, Faces, Opaque, Veils, Objects, Images];
+    /// Those of them that tell of faces; the others tell where these are seen.
+    pub const OF_FACES: [Self; 3] = [Points, Vertices, Faces];
 
     /// Tables whose batches are bands of guests.
     pub const OF_GUESTS: [Self; 2] = [GuestPixels, GuestSamples];
@@ -71,14 +71,12 @@ impl TableName {
     pub fn schema(self) -> Schema {
         let number = |name: &str| Field::new(name, DataType::UInt32, false);
         let real = |name: &str| Field::new(name, DataType::Float64, false);
-        let short = |name: &str| Field::new(name, DataType::Float32, true);
-        let numbers = |name: &str| Field::new(name, list_of(DataType::UInt32), false);
+        let numbers = numbers_field;
         let fields = match self {
             Points => vec![real("x"), real("y")],
             Vertices => {
                 let mut fields = vec![number("object"), number("vertex")];
-                fields.extend(["x", "y", "z"].map(real));
-                fields.extend(ATTRIBUTES.iter().copied().map(short));
+                fields.extend(vertex_fields());
                 fields
             }
             Faces => vec![
@@ -136,6 +134,19 @@ fn list_of(values: DataType) -> DataType {
     DataType::List(Arc::new(Field::new_list_field(values, false)))
 }
 
+/// A column of lists of numbers.
+pub fn numbers_field(name: &str) -> Field {
+    Field::new(name, list_of(DataType::UInt32), false)
+}
+
+/// Columns that tell a vertex: its place and its attributes.
+pub fn vertex_fields() -> impl Iterator<Item = Field> {
+    let real = |name| Field::new(name, DataType::Float64, false);
+    let short = |name| Field::new(name, DataType::Float32, true);
+    let attributes = ATTRIBUTES.into_iter().map(short);
+    ["x", "y", "z"].into_iter().map(real).chain(attributes)
+}
+
 fn matrix_type() -> DataType {
     DataType::FixedSizeList(
         Arc::new(Field::new_list_field(DataType::Float64, false)),
@@ -144,19 +155,19 @@ fn matrix_type() -> DataType {
 }
 
 /// Lists of numbers, one after the other.
-struct Lists(ListBuilder<UInt32Builder>);
+pub struct Lists(ListBuilder<UInt32Builder>);
 
 impl Lists {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let field = Field::new_list_field(DataType::UInt32, false);
         Self(ListBuilder::new(UInt32Builder::new()).with_field(field))
     }
 
-    fn push(&mut self, numbers: impl Iterator<Item = u32>) {
+    pub fn push(&mut self, numbers: impl Iterator<Item = u32>) {
         self.0.append_value(numbers.map(Some));
     }
 
-    fn finish(mut self) -> ArrayRef {
+    pub fn finish(mut self) -> ArrayRef {
         Arc::new(self.0.finish())
     }
 }
@@ -208,7 +219,8 @@ impl PointRows {
     }
 }
 
-fn numbers(values: impl Iterator<Item = u32>) -> ArrayRef {
+/// A column of numbers.
+pub fn numbers(values: impl Iterator<Item = u32>) -> ArrayRef {
     Arc::new(UInt32Array::from_iter_values(values))
 }
 
@@ -297,25 +309,29 @@ fn vertex_rows(map: &VisibilityMap, scene: &Scene, faces: &[FaceId]) -> RecordBa
         .iter()
         .map(|&(object, vertex)| (scene.mesh_of(object), vertex as usize))
         .collect();
-    let position = |of: fn(DVec3) -> f64| -> ArrayRef {
-        let rows = meshes.iter().map(|&(mesh, row)| of(mesh.positions[row]));
-        Arc::new(Float64Array::from_iter_values(rows))
-    };
     let mut columns = vec![
         numbers(rows.iter().map(|row| row.0.0)),
         numbers(rows.iter().map(|row| row.1)),
-        position(|p| p.x),
-        position(|p| p.y),
-        position(|p| p.z),
     ];
+    columns.extend(vertex_columns(&meshes));
+    Vertices.batch(columns)
+}
+
+/// The columns of [`vertex_fields`], of rows of meshes.
+pub fn vertex_columns(rows: &[(&Mesh, usize)]) -> Vec<ArrayRef> {
+    let position = |of: fn(DVec3) -> f64| -> ArrayRef {
+        let rows = rows.iter().map(|&(mesh, row)| of(mesh.positions[row]));
+        Arc::new(Float64Array::from_iter_values(rows))
+    };
+    let mut columns = vec![position(|p| p.x), position(|p| p.y), position(|p| p.z)];
     for attribute in 0..ATTRIBUTES.len() {
-        let column: Float32Array = meshes
+        let column: Float32Array = rows
             .iter()
             .map(|&(mesh, row)| attribute_of(mesh, row, attribute))
             .collect();
         columns.push(Arc::new(column));
     }
-    Vertices.batch(columns)
+    columns
 }
 
 /// Attribute `attribute` of [`ATTRIBUTES`] at a vertex.
@@ -394,6 +410,10 @@ impl Rows<'_> {
         Ok(column.values())
     }
 
+    pub fn booleans(&self, name: &str) -> Result<&BooleanArray, FileError> {
+        self.full(name, |column| column.as_boolean_opt())
+    }
+
     pub fn reals(&self, name: &str) -> Result<&[f64], FileError> {
         let column = self.full(name, |column| column.as_primitive_opt::<Float64Type>())?;
         if column.values().iter().any(|value| !value.is_finite()) {
@@ -408,7 +428,7 @@ impl Rows<'_> {
         Ok(column.values())
     }
 
-    fn lists(&self, name: &str) -> Result<NumberLists<'_>, FileError> {
+    pub fn lists(&self, name: &str) -> Result<NumberLists<'_>, FileError> {
         let lists: &ListArray = self.full(name, |column| column.as_list_opt::<i32>())?;
         let numbers = lists.values().as_primitive_opt::<UInt32Type>();
         let numbers = numbers.filter(|numbers| numbers.null_count() == 0);
@@ -430,7 +450,7 @@ impl Rows<'_> {
     pub fn faces(&self, points: &[DVec2]) -> Result<Vec<FaceRow>, FileError> {
         let (face, object) = (self.numbers("face")?, self.numbers("object")?);
         let (material, plane) = (self.numbers("material")?, self.numbers("plane")?);
-        let opaque = self.full("opaque", |column| column.as_boolean_opt())?;
+        let opaque = self.booleans("opaque")?;
         let (a, b, c) = (self.reals("a")?, self.reals("b")?, self.reals("c")?);
         let (outlines, corners) = (self.lists("outline")?, self.lists("corners")?);
         (0..face.len())
@@ -487,16 +507,22 @@ impl Rows<'_> {
     /// The vertices of a tile.
     pub fn vertices(&self) -> Result<Vec<VertexRow>, FileError> {
         let (object, vertex) = (self.numbers("object")?, self.numbers("vertex")?);
+        let rows = object.iter().zip(vertex).zip(self.vertex_columns()?);
+        Ok(rows
+            .map(|((&object, &vertex), at)| VertexRow { object, vertex, at })
+            .collect())
+    }
+
+    /// What [`vertex_fields`] tell.
+    pub fn vertex_columns(&self) -> Result<Vec<Vertex>, FileError> {
         let (x, y, z) = (self.reals("x")?, self.reals("y")?, self.reals("z")?);
         let columns: Result<Vec<&Float32Array>, FileError> = ATTRIBUTES
             .iter()
             .map(|name| self.column(name, |column| column.as_primitive_opt::<Float32Type>()))
             .collect();
         let columns = columns?;
-        Ok((0..object.len())
-            .map(|row| VertexRow {
-                object: object[row],
-                vertex: vertex[row],
+        Ok((0..x.len())
+            .map(|row| Vertex {
                 position: DVec3::new(x[row], y[row], z[row]),
                 attributes: std::array::from_fn(|attribute| {
                     let column = columns[attribute];
@@ -551,13 +577,13 @@ impl Rows<'_> {
 }
 
 /// A column of lists.
-struct NumberLists<'a> {
+pub struct NumberLists<'a> {
     ends: &'a [i32],
     numbers: &'a [u32],
 }
 
 impl<'a> NumberLists<'a> {
-    fn of(&self, row: usize) -> &'a [u32] {
+    pub fn of(&self, row: usize) -> &'a [u32] {
         &self.numbers[self.ends[row] as usize..self.ends[row + 1] as usize]
     }
 }
@@ -588,12 +614,18 @@ pub struct FragmentRow {
 pub struct VertexRow {
     pub object: u32,
     pub vertex: u32,
-    pub position: DVec3,
+    pub at: Vertex,
+}
+
+/// Where a vertex is, and what it looks like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vertex {
+    position: DVec3,
     /// As bits, so that equal rows are equal whatever they hold.
     attributes: [Option<u32>; ATTRIBUTES.len()],
 }
 
-impl VertexRow {
+impl Vertex {
     /// Adds the vertex to a mesh; `false` if it has other attributes than those before it.
     pub fn push_to(&self, mesh: &mut Mesh) -> bool {
         let attributes = self.attributes.map(|bits| bits.map(f32::from_bits));

@@ -5,10 +5,11 @@ use crate::scene::{
     Shown, TextureRef, World,
 };
 use crate::{
-    Camera, FaceId, Faces, Fragments, Guest, GuestGrid, GuestKind, GuestSamples, MaterialId,
-    ObjectId, Projection, SeenScene, Side,
+    Camera, Casters, Choice, FaceId, Faces, Fragments, Guest, GuestGrid, GuestKind, GuestSamples,
+    MaterialId, ObjectId, Origin, Projection, Reading, SeenScene, SeenSpans, Side, Source, Span,
+    SpanBand, Spans,
 };
-use std::io::Cursor;
+use std::io::{Cursor, Write};
 use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
 
 fn camera() -> Camera {
@@ -45,9 +46,8 @@ fn mesh(faces: u32) -> Mesh {
     mesh
 }
 
-/// A scene of two objects, with everything that a file keeps, and a map of it. It is not what the
-/// camera sees: files do not ask.
-fn seen(faces: u32) -> SeenScene {
+/// A scene of two objects, with everything that a file keeps.
+fn scene(faces: u32) -> Scene {
     let image = |name: &str| Image {
         name: name.into(),
         width: 2,
@@ -80,7 +80,7 @@ fn seen(faces: u32) -> SeenScene {
         },
         world_from_light: DMat4::IDENTITY,
     };
-    let scene = Scene {
+    Scene {
         objects: vec![object("a/first", 0), object("b", 1)],
         meshes: vec![mesh(faces), triangles],
         materials: vec![
@@ -102,7 +102,12 @@ fn seen(faces: u32) -> SeenScene {
             origin: DVec3::new(84_900.1, 447_700.0, 0.0),
             vertical_datum: None,
         },
-    };
+    }
+}
+
+/// A map of [`scene`]. It is not what the camera sees: files do not ask.
+pub(super) fn seen(faces: u32) -> SeenScene {
+    let scene = scene(faces);
     let mut table = Faces::new();
     let (mut opaque, mut veils) = (Fragments::new(), Fragments::new());
     for object in 0..2 {
@@ -125,8 +130,10 @@ fn seen(faces: u32) -> SeenScene {
             match source % 5 {
                 0 => opaque.push_whole(face),
                 1 => {
-                    opaque.push_cut(face, outline.into_iter().zip(sides));
-                    opaque.push_cut(face, outline.into_iter().zip(sides));
+                    let [p, q, r] = outline;
+                    let middle = 0.5 * (p + q);
+                    opaque.push_cut(face, [p, middle, r].into_iter().zip(sides));
+                    opaque.push_cut(face, [middle, q, r].into_iter().zip(sides));
                 }
                 2 => {
                     table.set_veil(face);
@@ -171,14 +178,105 @@ fn guest(name: &str, size: [u32; 2]) -> Guest {
     Guest::new(name.into(), GuestKind::Deep, grid, samples, objects).expect("sound")
 }
 
-fn written(seen: &SeenScene) -> Vec<u8> {
-    let source = Source {
-        path: "town.glb".into(),
+fn source(path: &str) -> Source {
+    Source {
+        path: path.into(),
         length: 3,
         xxh3: "0".into(),
+    }
+}
+
+pub(super) fn written_of(seen: &SeenScene, casters: Option<Casters>) -> Vec<u8> {
+    let origin = Origin {
+        sources: vec![source("town.glb")],
+        casters,
     };
-    let out = write_map(Cursor::new(Vec::new()), seen, &[source]).expect("memory takes all");
+    let out = write_map(Cursor::new(Vec::new()), seen, &origin).expect("memory takes all");
     out.into_inner()
+}
+
+/// Some spans of [`scene`].
+pub(super) fn seen_spans() -> SeenSpans {
+    let seen = seen(12);
+    let (width, height, per_row) = (40, 70, 2);
+    let faces = seen.map.faces.len() as u32;
+    let mut bands: Vec<SpanBand> = Vec::new();
+    for band in 0..3 {
+        let first = 64 * band;
+        let mut band = SpanBand {
+            first,
+            ..SpanBand::default()
+        };
+        for line in first..(first + 64).min(per_row * height + 1) {
+            // Along some nothing is seen.
+            for k in 0..line % 4 {
+                let left = 7.3 * f64::from(k) + 0.1;
+                let face = FaceId((line + k) % faces);
+                let right = left + 1.0 + f64::from(line % 9) / 1.5;
+                band.spans.push(Span { face, left, right });
+            }
+            band.ends.push(band.spans.len() as u32);
+        }
+        bands.push(band);
+    }
+    let spans = Spans::new(width, height, per_row, bands);
+    SeenSpans::of(&seen.scene, &seen.map.camera, seen.map.faces, &spans)
+}
+
+pub(super) fn written_spans(seen: &SeenSpans) -> Vec<u8> {
+    let origin = Origin {
+        sources: vec![source("town.glb")],
+        casters: Some(Casters::default()),
+    };
+    let out = write_spans(Cursor::new(Vec::new()), seen, &origin).expect("memory takes all");
+    out.into_inner()
+}
+
+fn written(seen: &SeenScene) -> Vec<u8> {
+    written_of(seen, None)
+}
+
+/// A scene that casts: what [`seen`] is a part of, with an image of its own and meshes of all kinds.
+pub(super) fn casters(faces: u32) -> Casters {
+    let mut scene = scene(faces);
+    let tangle = |faces: u32| Mesh {
+        normals: Vec::new(),
+        opacities: vec![0.5; mesh(faces).positions.len()],
+        second_texcoords: mesh(faces).texcoords,
+        ..mesh(faces)
+    };
+    scene
+        .meshes
+        .extend([Mesh::default(), tangle(2), tangle(70)]);
+    scene.meshes.push(Mesh {
+        // Triangles alone, but told as polygons; and a material told twice.
+        fans: vec![0, 1],
+        triangles: vec![[0, 1, 2], [2, 1, 3]],
+        materials: vec![(0, MaterialId(1)), (1, MaterialId(1))],
+        positions: mesh(1).positions,
+        ..Mesh::default()
+    });
+    for mesh in [2, 5, 3, 4, 3] {
+        scene.objects.push(Object {
+            name: format!("hidden/{mesh}"),
+            mesh: MeshId(mesh),
+            world_from_object: DMat4::from_scale(DVec3::new(-0.1, 0.0, 1.0 / 3.0)),
+        });
+    }
+    let reading = Reading {
+        files: vec![source("lamp.toml"), source("lamp.glb")],
+        up_axis: Some("z".into()),
+        layers: Some(vec!["lamp".into()]),
+        choices: vec![Choice {
+            only: vec!["lamp/**".into()],
+            without: Vec::new(),
+        }],
+        ..Reading::default()
+    };
+    Casters {
+        embedded: Some(scene),
+        readings: vec![reading],
+    }
 }
 
 fn read(bytes: &[u8]) -> Result<SeenScene, FileError> {
@@ -224,6 +322,74 @@ fn what_was_written_is_read_bit_for_bit() {
         let found = MapReader::new(Cursor::new(&bytes)).expect("sound");
         assert_eq!(found.sources()[0].path, "town.glb");
     }
+}
+
+#[test]
+fn casters_are_read_bit_for_bit_by_those_who_ask() {
+    // Meshes within a batch, and one over several.
+    for faces in [12, 40_000] {
+        let (seen, casters) = (seen(12), casters(faces));
+        let bytes = written_of(&seen, Some(casters.clone()));
+        assert!(bytes == written_of(&seen, Some(casters.clone())));
+        let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+        assert!(reader.read().expect("sound") == seen);
+        let without = reader.bytes_read();
+        let found = reader.read_casters().expect("sound").expect("are told");
+        assert!(found == casters, "{faces} faces");
+        assert!(faces < 100 || reader.bytes_read() > 10 * without);
+        assert_eq!(reader.readings(), casters.readings);
+        // Of three images, of which one is seen, two are stored beside it.
+        let images = reader.manifest().casters.clone();
+        let images = images
+            .and_then(|told| told.embedded)
+            .expect("are told")
+            .images;
+        assert_eq!(images, [1, 0]);
+    }
+    let unknown = written(&seen(12));
+    let mut reader = MapReader::new(Cursor::new(&unknown)).expect("sound");
+    assert!(reader.read_casters().expect("sound").is_none());
+}
+
+#[test]
+fn spans_are_read_bit_for_bit_and_are_no_map() {
+    let seen = seen_spans();
+    assert!(seen.spans.len() > 100);
+    let bytes = written_spans(&seen);
+    assert!(bytes == written_spans(&seen));
+    let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+    assert!(reader.check_spans().expect("sound") == seen);
+    assert_eq!(
+        reader.read_casters().expect("sound"),
+        Some(Casters::default())
+    );
+    for refused in [reader.read(), reader.check()] {
+        let message = refused.expect_err("is no map").to_string();
+        assert!(message.contains("holds spans of multiscan"), "{message}");
+    }
+    let mut reader = MapReader::new(Cursor::new(written(&super::tests::seen(12)))).expect("sound");
+    let message = reader.read_spans().expect_err("is a map").to_string();
+    assert!(message.contains("holds regions"), "{message}");
+
+    // Also where nothing is seen.
+    let mut empty = seen;
+    let band = SpanBand {
+        first: 0,
+        spans: Vec::new(),
+        ends: vec![0; 141],
+    };
+    empty.spans = Spans::new(40, 70, 2, vec![band]);
+    let empty = SeenSpans::of(&empty.scene, &empty.camera, empty.faces, &empty.spans);
+    let bytes = written_spans(&empty);
+    let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+    assert!(reader.check_spans().expect("sound") == empty);
+}
+
+#[test]
+fn a_file_of_version_1_0_is_read() {
+    let bytes = written(&seen(12));
+    let old = rewritten(&bytes, |manifest| manifest.version = [1, 0]);
+    assert!(read(&old).expect("sound") == seen(12));
 }
 
 #[test]
@@ -341,16 +507,23 @@ fn where_faces_are_dense_a_window_reads_little_more_than_those_in_it() {
 
 #[test]
 fn every_cut_and_every_flipped_bit_of_a_small_file_is_an_error() {
-    let sound = written(&seen(6));
+    let sound = written_of(&seen(6), Some(casters(2)));
     for length in 0..sound.len() {
         assert!(read(&sound[..length]).is_err(), "cut to {length} bytes");
     }
-    for bit in 0..8 * sound.len() {
-        let mut damaged = sound.clone();
-        damaged[bit / 8] ^= 1 << (bit % 8);
-        let error = read(&damaged).err();
-        assert!(error.is_some(), "bit {bit} of {} bytes", sound.len());
-    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for thread in 0..threads {
+            let mut damaged = sound.clone();
+            scope.spawn(move || {
+                for bit in (thread..8 * damaged.len()).step_by(threads) {
+                    damaged[bit / 8] ^= 1 << (bit % 8);
+                    assert!(read(&damaged).is_err(), "bit {bit}");
+                    damaged[bit / 8] ^= 1 << (bit % 8);
+                }
+            });
+        }
+    });
 }
 
 #[test]
@@ -408,7 +581,7 @@ fn a_file_of_version_1_0_is_read() {
 
 #[test]
 fn flipped_bits_of_a_large_file_are_errors() {
-    let sound = written(&seen(6000));
+    let sound = written_of(&seen(6000), Some(casters(1000)));
     let flips: u64 = std::env::var("VEDUTA_DAMAGE").map_or(500, |n| n.parse().expect("a number"));
     let mut state = 1_u64;
     for _ in 0..flips {
@@ -420,6 +593,29 @@ fn flipped_bits_of_a_large_file_are_errors() {
         damaged[bit / 8] ^= 1 << (bit % 8);
         assert!(read(&damaged).is_err(), "bit {bit}");
     }
+}
+
+/// The file with another manifest, all checksums right.
+fn rewritten(bytes: &[u8], change: impl FnOnce(&mut manifest::Manifest)) -> Vec<u8> {
+    let mut archive = container::ArchiveReader::new(Cursor::new(bytes)).expect("sound");
+    let mut writer = container::ArchiveWriter::new(Cursor::new(Vec::new()));
+    let mut change = Some(change);
+    for member in archive.members().to_vec() {
+        let mut contents = archive
+            .bytes("a member", member.start(), member.length)
+            .expect("sound");
+        if member.name == manifest::MANIFEST
+            && let Some(change) = change.take()
+        {
+            let mut manifest = manifest::Manifest::parse(&contents).expect("sound");
+            change(&mut manifest);
+            contents = serde_json::to_vec(&manifest).expect("JSON");
+        }
+        writer.begin(&member.name).expect("memory takes all");
+        writer.write_all(&contents).expect("memory takes all");
+        writer.end().expect("memory takes all");
+    }
+    writer.finish().expect("memory takes all").into_inner()
 }
 
 #[test]

@@ -1,5 +1,5 @@
 use crate::ObjectId;
-use crate::scene::Scene;
+use crate::scene::{Object, Scene};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use veduta_geometry::DVec3;
@@ -130,25 +130,37 @@ impl Scene {
         for layer in self.layers.iter().filter(|layer| !keep(layer)) {
             kept[layer.objects.start as usize..layer.objects.end as usize].fill(false);
         }
+        self.keep_rows(&kept);
+        self.layers.retain(&keep);
+    }
+
+    /// Leaves out all objects but those that `keep` accepts. All else stays as it is, layers without
+    /// objects too.
+    pub fn keep_objects(&mut self, keep: impl Fn(&Object) -> bool) {
+        let kept: Vec<bool> = self.objects.iter().map(keep).collect();
+        self.keep_rows(&kept);
+    }
+
+    fn keep_rows(&mut self, kept: &[bool]) {
         // How many stay before each object.
         let mut before = vec![0; kept.len() + 1];
         for (index, &is_kept) in kept.iter().enumerate() {
             before[index + 1] = before[index] + u32::from(is_kept);
         }
-        self.layers.retain(&keep);
         for layer in &mut self.layers {
             let moved = |end: u32| before[end as usize];
             layer.objects = moved(layer.objects.start)..moved(layer.objects.end);
         }
-        let mut kept = kept.into_iter();
-        self.objects.retain(|_| kept.next().unwrap_or(true));
+        let mut kept = kept.iter();
+        self.objects
+            .retain(|_| kept.next().copied().unwrap_or(true));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{MeshId, Object};
+    use crate::scene::MeshId;
     use veduta_geometry::DMat4;
 
     fn scene() -> Scene {

@@ -2,14 +2,15 @@ use super::merge::{Meeting, merge};
 use super::pieced::Pieced;
 use crate::scene::{FaceIndex, PlaneGroups};
 use std::cmp::Reverse;
+use std::collections::HashMap;
 use std::ops::Range;
 use veduta_geometry::DMat4;
 use veduta_map::scene::{
     Image, ImageId, Layer, Material, Mesh, MeshId, Object, ObjectKey, Scene, Shown, World,
 };
 use veduta_map::{
-    Camera, FaceId, Faces, Guest, ObjectId, ObjectMesh, PlaneId, Projection, Seen, SeenScene,
-    VisibilityMap,
+    Camera, FaceId, Faces, Guest, MaterialId, ObjectId, ObjectMesh, PlaneId, Projection, Seen,
+    SeenScene, VisibilityMap,
 };
 
 /// Why maps cannot be composited.
@@ -42,6 +43,14 @@ pub enum CompositeError {
     Guests {
         /// Which of the maps.
         index: usize,
+    },
+    /// Spans meet on common sub-scanlines only.
+    #[error("picture {index} was sampled otherwise than the first: {difference}")]
+    OtherSampling {
+        /// Which of the pictures.
+        index: usize,
+        /// In what they differ.
+        difference: String,
     },
 }
 
@@ -127,8 +136,10 @@ impl<'a> Union<'a> {
         let maps: Vec<&SeenScene> = maps.collect();
         check_alike(&maps)?;
         let first = maps[0];
-        let united = UnitedScenes::of(&maps);
-        let (faces, new_ids) = united.faces(&maps);
+        let scenes: Vec<&Scene> = maps.iter().map(|seen| &seen.scene).collect();
+        let united = UnitedScenes::of(&scenes);
+        let tables: Vec<&Faces> = maps.iter().map(|seen| &seen.map.faces).collect();
+        let (faces, new_ids) = united.faces(&tables);
         let seen = maps.iter().zip(&new_ids).map(|(seen, new_ids)| {
             let new_id = |face: FaceId| new_ids[face.index()];
             Seen {
@@ -188,16 +199,32 @@ impl<'a> Union<'a> {
 
 /// Fails for no maps, and for maps of different cameras or places in the world.
 pub(super) fn check_alike(maps: &[&SeenScene]) -> Result<(), CompositeError> {
-    let (first, others) = maps.split_first().ok_or(CompositeError::Nothing)?;
-    for (other, index) in others.iter().zip(1..) {
-        if let Some(difference) = camera_difference(&first.map.camera, &other.map.camera) {
+    let views = maps.iter();
+    refuse_other_views(views.map(|seen| (&seen.map.camera, &seen.scene.world)))
+}
+
+/// Fails on the first view that cannot be composited with that before all.
+pub(super) fn refuse_other_views<'a>(
+    mut views: impl Iterator<Item = (&'a Camera, &'a World)>,
+) -> Result<(), CompositeError> {
+    let Some((camera, world)) = views.next() else {
+        return Err(CompositeError::Nothing);
+    };
+    for (index, (other_camera, other_world)) in (1..).zip(views) {
+        if let Some(difference) = camera_difference(camera, other_camera) {
             return Err(CompositeError::OtherCamera { index, difference });
         }
-        if let Some(difference) = world_difference(&first.scene.world, &other.scene.world) {
+        if let Some(difference) = world_difference(world, other_world) {
             return Err(CompositeError::OtherWorld { index, difference });
         }
     }
     Ok(())
+}
+
+/// Scenes as one, with their objects in the order of [`Scene::key_order`]; also where they are told scene
+/// by scene or united before. Cameras, meshes without an object and layers without one are left out.
+pub fn unite(scenes: &[&Scene]) -> Scene {
+    UnitedScenes::of(scenes).into_scene()
 }
 
 /// In what two cameras differ, in words for the user. Near planes may: nearness does not depend on them.
@@ -265,63 +292,61 @@ fn world_difference(one: &World, other: &World) -> Option<String> {
     })
 }
 
-/// The scenes of several maps as one.
-struct UnitedScenes<'a> {
+/// Several scenes as one.
+pub(super) struct UnitedScenes<'a> {
     /// Without meshes.
     scene: Scene,
     /// Those of its objects.
     meshes: Vec<ObjectMesh<'a>>,
-    /// Of each map, the new numbers of its objects.
+    /// Of each of the scenes, the new numbers of its objects.
     objects: Vec<Vec<ObjectId>>,
 }
 
 impl<'a> UnitedScenes<'a> {
-    fn of(maps: &[&'a SeenScene]) -> Self {
-        let mut scene = Scene {
-            world: maps
-                .iter()
-                .map(|seen| &seen.scene.world)
-                .find(|world| world.crs.is_some())
-                .unwrap_or(&maps[0].scene.world)
-                .clone(),
+    pub fn of(scenes: &[&'a Scene]) -> Self {
+        let placed = scenes.iter().find(|scene| scene.world.crs.is_some());
+        let mut united = Scene {
+            world: placed
+                .or(scenes.first())
+                .map_or_else(World::default, |scene| scene.world.clone()),
             ..Scene::default()
         };
         let mut order: Vec<(ObjectKey, usize, ObjectId)> = Vec::new();
-        for (map, SeenScene { scene, .. }) in maps.iter().enumerate() {
+        for (number, scene) in scenes.iter().enumerate() {
             let objects = (0..scene.objects.len()).map(ObjectId::from_index);
-            order.extend(objects.map(|object| (scene.key_of(object), map, object)));
+            order.extend(objects.map(|object| (scene.key_of(object), number, object)));
         }
         order.sort_unstable();
-        let has_layers = maps.iter().any(|seen| !seen.scene.layers.is_empty());
-        let mut objects: Vec<Vec<ObjectId>> = maps
+        let has_layers = scenes.iter().any(|scene| !scene.layers.is_empty());
+        let mut objects: Vec<Vec<ObjectId>> = scenes
             .iter()
-            .map(|seen| vec![ObjectId(0); seen.scene.objects.len()])
+            .map(|scene| vec![ObjectId(0); scene.objects.len()])
             .collect();
-        let first_material: Vec<u32> = maps
+        let first_material: Vec<u32> = scenes
             .iter()
-            .map(|seen| add_materials(&mut scene, &seen.scene.materials, &seen.scene.images))
+            .map(|scene| add_materials(&mut united, &scene.materials, &scene.images))
             .collect();
         let mut meshes: Vec<ObjectMesh> = Vec::with_capacity(order.len());
-        for &((Reverse(priority), layer, _), map, object) in &order {
-            let id = ObjectId::from_index(scene.objects.len());
-            objects[map][object.index()] = id;
-            let from = &maps[map].scene;
+        for &((Reverse(priority), layer, _), number, object) in &order {
+            let id = ObjectId::from_index(united.objects.len());
+            objects[number][object.index()] = id;
+            let from = scenes[number];
             meshes.push(ObjectMesh {
                 mesh: from.mesh_of(object),
-                first_material: first_material[map],
+                first_material: first_material[number],
             });
-            scene.objects.push(Object {
+            united.objects.push(Object {
                 mesh: MeshId(id.0),
                 ..from.object(object).clone()
             });
             if has_layers {
                 let shown = from.shown(object);
                 let row = (layer, priority, shown);
-                match scene.layers.last_mut() {
+                match united.layers.last_mut() {
                     Some(last) if (&*last.name, last.priority, last.shown) == row => {
                         last.objects.end = id.0 + 1;
                     }
-                    _ => scene.layers.push(Layer {
+                    _ => united.layers.push(Layer {
                         name: layer.into(),
                         priority,
                         shown,
@@ -330,27 +355,41 @@ impl<'a> UnitedScenes<'a> {
                 }
             }
         }
-        for seen in maps {
-            for light in &seen.scene.lights {
-                if !scene.lights.contains(light) {
-                    scene.lights.push(light.clone());
-                }
+        for light in scenes.iter().flat_map(|scene| &scene.lights) {
+            if !united.lights.contains(light) {
+                united.lights.push(light.clone());
             }
         }
         Self {
-            scene,
+            scene: united,
             meshes,
             objects,
         }
     }
 
-    /// The faces of all maps as one table in the order of the objects, and of each map the new numbers
-    /// of its faces.
-    fn faces(&self, maps: &[&SeenScene]) -> (Faces, Vec<Vec<FaceId>>) {
-        // Faces of an object follow one another in its map.
+    /// The scene with its meshes. Objects that shared one go on to do so.
+    pub fn into_scene(self) -> Scene {
+        let mut scene = self.scene;
+        let mut known: HashMap<*const Mesh, MeshId> = HashMap::new();
+        for (object, of) in scene.objects.iter_mut().zip(&self.meshes) {
+            object.mesh = *known.entry(std::ptr::from_ref(of.mesh)).or_insert_with(|| {
+                let mut mesh = of.mesh.clone();
+                for (_, material) in &mut mesh.materials {
+                    *material = MaterialId(material.0 + of.first_material);
+                }
+                scene.meshes.push(mesh);
+                MeshId(scene.meshes.len() as u32 - 1)
+            });
+        }
+        scene
+    }
+
+    /// The faces of all scenes as one table in the order of the objects, and of each scene the new
+    /// numbers of its faces.
+    pub fn faces(&self, tables: &[&Faces]) -> (Faces, Vec<Vec<FaceId>>) {
+        // Faces of an object follow one another in its table.
         let mut runs: Vec<(ObjectId, usize, Range<u32>)> = Vec::new();
-        for (map, seen) in maps.iter().enumerate() {
-            let table = &seen.map.faces;
+        for (map, table) in tables.iter().enumerate() {
             for face in table.ids() {
                 let object = self.objects[map][table.object(face).index()];
                 match runs.last_mut() {
@@ -360,21 +399,21 @@ impl<'a> UnitedScenes<'a> {
             }
         }
         runs.sort_by_key(|run| run.0);
-        let count = maps.iter().map(|seen| seen.map.faces.len()).sum();
+        let count = tables.iter().map(|table| table.len()).sum();
         let mut faces = Faces::with_capacity(count);
-        let mut new_ids: Vec<Vec<FaceId>> = maps
+        let mut new_ids: Vec<Vec<FaceId>> = tables
             .iter()
-            .map(|seen| vec![FaceId(0); seen.map.faces.len()])
+            .map(|table| vec![FaceId(0); table.len()])
             .collect();
-        let mut first_plane = Vec::with_capacity(maps.len());
-        for seen in maps {
+        let mut first_plane = Vec::with_capacity(tables.len());
+        for table in tables {
             first_plane.push(faces.planes().len() as u32);
-            for &plane in seen.map.faces.planes() {
+            for &plane in table.planes() {
                 faces.push_plane(plane);
             }
         }
         for (object, map, run) in runs {
-            let table = &maps[map].map.faces;
+            let table = tables[map];
             for face in run.map(FaceId) {
                 let plane = PlaneId(table.plane(face).0 + first_plane[map]);
                 let source = table.source(face);

@@ -1,8 +1,7 @@
 use super::{Part, Parts, Run};
-use crate::visibility::multiscan::{Span, Spans};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use veduta_geometry::{DVec2, Vec2};
-use veduta_map::FaceId;
+use veduta_map::{FaceId, Span, Spans};
 
 /// Dices the spans of some rows of a picture, as [`dice`](super::dice) does fragments: an area is
 /// what Nakamae et al. (1989), eq. (1) to (6), make of the lengths of spans. `parts` is overwritten.
@@ -19,16 +18,20 @@ pub fn dice_spans(
 ) {
     parts.boundary.clear();
     parts.runs.clear();
-    let n = spans.sub_scanlines_per_row();
     for row in rows.clone() {
+        let (first_line, last_line) = spans.lines_of_row(row).into_inner();
+        let n = last_line - first_line;
+        if n == 0 {
+            continue;
+        }
         let first_pixel = (row - rows.start) * spans.width();
-        dicer.find_filled(spans, row);
+        dicer.find_filled(spans, first_line..=last_line);
         dicer.pieces.clear();
         for line in 0..=n {
             // Sub-scanlines 0 and n lie on the row's borders: eq. (1).
             let weight = if line == 0 || line == n { 0.5 } else { 1.0 } / f64::from(n);
             let y = f64::from(line) / f64::from(n);
-            dicer.add_pieces(spans.sub_scanline(row * n + line), y, weight);
+            dicer.add_pieces(spans.sub_scanline(first_line + line), y, weight);
         }
         dicer.pieces.sort_by_key(|piece| (piece.pixel, piece.face));
         let of_one = |a: &Piece, b: &Piece| (a.pixel, a.face) == (b.pixel, b.face);
@@ -77,12 +80,12 @@ struct Piece {
 
 impl SpanDicer {
     /// Intersects what is filled on the row's sub-scanlines.
-    fn find_filled(&mut self, spans: &Spans, row: u32) {
-        let n = spans.sub_scanlines_per_row();
+    fn find_filled(&mut self, spans: &Spans, lines: RangeInclusive<u32>) {
+        let (first, last) = lines.into_inner();
         self.filled.clear();
-        let first = spans.sub_scanline(row * n).iter();
-        self.filled.extend(first.filter_map(filled_by));
-        for line in row * n + 1..=(row + 1) * n {
+        let of_first = spans.sub_scanline(first).iter();
+        self.filled.extend(of_first.filter_map(filled_by));
+        for line in first + 1..=last {
             self.narrowed.clear();
             let mut before = self.filled.iter().peekable();
             for next in spans.sub_scanline(line).iter().filter_map(filled_by) {

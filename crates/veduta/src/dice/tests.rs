@@ -315,7 +315,7 @@ fn centroids_of_the_parts_of_a_face_average_to_its_own() {
 
 #[test]
 fn parts_of_spans_have_the_areas_of_the_paper() {
-    use crate::visibility::multiscan::find_spans;
+    use crate::visibility::multiscan::{find_spans, picture};
     let made = crate::scene::generate::by_name("balls3").expect("a generated scene");
     let faces = crate::visibility::project(&made.scene, &made.camera);
     for n in [1, 3] {
@@ -323,7 +323,7 @@ fn parts_of_spans_have_the_areas_of_the_paper() {
         let spans = find_spans(&faces, width, height, n);
         // A colour that tells faces apart.
         let color = |face: FaceId| [(face.0 % 7) as f32, (face.0 % 5) as f32, 1.0, 1.0];
-        let expected = spans.picture(color);
+        let expected = picture(&spans, color);
         let mut parts = Parts::default();
         dice_spans(
             &spans,

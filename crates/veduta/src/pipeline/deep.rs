@@ -67,6 +67,22 @@ pub fn render_deep<E>(
     Ok(())
 }
 
+/// Makes the deep picture of a map of `scene` on any grid of pixels; flat, it is that of
+/// [`render_window`](super::render_window). `write` gets its rows from the top, some at a time.
+///
+/// # Errors
+/// Whatever `write` fails with.
+pub fn deep_window<E>(
+    scene: &Scene,
+    map: &VisibilityMap,
+    grid: &PixelGrid,
+    unlit: bool,
+    mut write: impl FnMut(&DeepRows) -> Result<(), E>,
+) -> Result<(), E> {
+    let textures = Textures::new(scene, &materials_seen(scene, map));
+    write_rows(scene, &textures, map, grid, unlit, &mut write)
+}
+
 /// What a thread keeps from band to band.
 #[derive(Default)]
 struct Buffers {

@@ -2,7 +2,7 @@
 
 mod topology;
 
-use super::stored::summary;
+use super::stored::Stored;
 use super::{Reading, is_picture};
 use crate::exit::{Ending, Failure};
 use crate::talk::{Talk, counted, plain, print};
@@ -11,9 +11,8 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use topology::Topology;
-use veduta::map::file::MapReader;
 use veduta::scene::Scene;
-use veduta_io::{is_map, open_map, read_picture, read_scene};
+use veduta_io::{MapFileError, check_source, is_map, open_map, read_picture, read_scene};
 
 /// Read models, stored maps and pictures, and report every error and warning
 ///
@@ -21,7 +20,8 @@ use veduta_io::{is_map, open_map, read_picture, read_scene};
 /// face only) or of more than two faces, and how many vertices no face uses. Corners at the same place
 /// count as one vertex there.
 ///
-/// Of a stored map every byte is compared with its checksum, and what it says with what maps must be.
+/// Of a stored map every byte is compared with its checksum, and what it says with what maps must be;
+/// with --sources also the files that it was made of with theirs.
 ///
 /// Exit code 1 if a file cannot be read, or, with --strict, has warnings.
 #[derive(Debug, Args)]
@@ -32,6 +32,9 @@ pub struct Check {
     files: Vec<PathBuf>,
     #[command(flatten)]
     reading: Reading,
+    /// Compare the files that a stored map was made of with what they were then
+    #[arg(long)]
+    sources: bool,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -41,6 +44,9 @@ const EXAMPLES: &str = "\
 Examples:
   A model and a picture:
       veduta check town.obj sky.jpg
+  A stored map, and whether its scene is still the same:
+      veduta render town.obj -o checked.veduta
+      veduta check --sources checked.veduta
   In a script, where warnings matter too:
       veduta check --strict --quiet town.obj && echo sound
 ";
@@ -123,11 +129,8 @@ impl Check {
             held: None,
         };
         if is_map(file) {
-            match open_map(file).and_then(|mut map| map.read(MapReader::check)) {
-                Ok(seen) => {
-                    let summary = summary(&seen);
-                    report.held = Some(Held::Map { summary });
-                }
+            match self.check_map(file, &mut report.errors) {
+                Ok(summary) => report.held = Some(Held::Map { summary }),
                 Err(error) => report.errors.push(error.to_string()),
             }
             return report;
@@ -157,6 +160,22 @@ impl Check {
             Err(error) => report.errors.extend(error.all().map(ToString::to_string)),
         }
         report
+    }
+}
+
+impl Check {
+    /// Checks a stored map; what it holds. Sources that have changed are added to `errors`.
+    fn check_map(&self, file: &Path, errors: &mut Vec<String>) -> Result<String, MapFileError> {
+        let mut map = open_map(file)?;
+        let seen = Stored::check(&mut map)?;
+        if self.sources {
+            let checked = map.sources();
+            let failed = checked
+                .iter()
+                .filter_map(|source| check_source(source).err());
+            errors.extend(failed.map(|error| format!("{}: {error}", file.display())));
+        }
+        Ok(seen.summary())
     }
 }
 

@@ -7,6 +7,7 @@ mod tree;
 
 use super::guests::kind_name;
 use super::render::View;
+use super::stored::Stored;
 use super::{is_picture, load};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, plain, print};
@@ -16,7 +17,6 @@ use pick::Spot;
 use serde_json::{Value, json};
 use std::io::{Read, Seek};
 use std::path::PathBuf;
-use veduta::map::SeenScene;
 use veduta::map::file::MapReader;
 use veduta::pipeline;
 use veduta_io::{LoadedPicture, is_map, open_map, read_picture};
@@ -103,9 +103,14 @@ impl Info {
     fn map(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
         talk.begin("reading");
         let mut map = open_map(&self.file)?;
-        let seen = map.read(|reader| reader.read())?;
+        let seen = Stored::read(&mut map)?;
         talk.end();
         if let Some(spot) = self.pick {
+            let Stored::Regions(seen) = &seen else {
+                let message = "--pick is for maps of regions; spans on sub-scanlines leave out what \
+                    lies between these";
+                return Err(Failure::new(Code::Usage, message));
+            };
             let [width, height] = seen.size;
             let size = self.size.unwrap_or(Size { width, height });
             let picked = pick::pick(&seen.scene, &seen.map, size, spot)?;
@@ -135,50 +140,87 @@ impl Info {
 }
 
 /// What a stored map holds, as JSON and text.
-fn map_told<R: Read + Seek>(seen: &SeenScene, file: &MapReader<R>, all: bool) -> (Value, String) {
-    let mut told = model::as_json(&seen.scene);
-    let [width, height] = seen.size;
-    let (opaque, veils) = (seen.map.opaque.len(), seen.map.veils.len());
+fn map_told<R: Read + Seek>(seen: &Stored, file: &MapReader<R>, all: bool) -> (Value, String) {
+    let mut told = model::as_json(seen.scene());
+    let [width, height] = seen.size();
     let sources: Vec<&str> = file
         .sources()
         .iter()
         .map(|source| source.path.as_str())
         .collect();
-    told["size"] = json!(seen.size);
-    told["facesSeen"] = seen.map.faces.len().into();
-    told["fragments"] = opaque.into();
-    told["veils"] = veils.into();
-    told["camera"] = model::camera_as_json("", &seen.map.camera);
+    told["size"] = json!(seen.size());
+    told["facesSeen"] = seen.faces().len().into();
+    let pieces = match seen {
+        Stored::Regions(seen) => {
+            let (opaque, veils) = (seen.map.opaque.len(), seen.map.veils.len());
+            told["fragments"] = opaque.into();
+            told["veils"] = veils.into();
+            format!("{opaque} fragments, {veils} veils")
+        }
+        Stored::Spans(seen) => {
+            let n = seen.spans.sub_scanlines_per_row();
+            told["spans"] = seen.spans.len().into();
+            told["subScanlines"] = n.into();
+            format!("{} spans on {n} sub-scanlines a row", seen.spans.len())
+        }
+    };
+    told["camera"] = model::camera_as_json("", seen.camera());
     told["sources"] = json!(sources);
     told["generator"] = file.generator().into();
-    told["hasHoles"] = seen.has_holes.into();
-    let guests = seen.guests.iter().map(|guest| {
-        let samples = guest.samples().len();
-        json!({
-            "name": guest.name(),
-            "kind": guest.kind(),
-            "size": guest.grid().size,
-            "samples": samples,
-        })
-    });
-    told["guests"] = guests.collect();
+    if let Stored::Regions(seen) = seen {
+        told["hasHoles"] = seen.has_holes.into();
+        let guests = seen.guests.iter().map(|guest| {
+            let samples = guest.samples().len();
+            json!({
+                "name": guest.name(),
+                "kind": guest.kind(),
+                "size": guest.grid().size,
+                "samples": samples,
+            })
+        });
+        told["guests"] = guests.collect();
+    }
+    let again: Vec<&str> = file
+        .readings()
+        .iter()
+        .filter_map(|reading| reading.files.first())
+        .map(|first| first.path.as_str())
+        .collect();
+    told["casters"] = match file.tells_casters() {
+        false => Value::Null,
+        true => json!({ "embedded": file.has_embedded_casters(), "readAgain": again }),
+    };
     let mut text = format!(
-        "  a map of  {width} x {height} pixels, by {}\n  seen      {} faces in {} fragments, {} veils\n",
+        "  a map of  {width} x {height} pixels, by {}\n  seen      {} faces in {pieces}\n",
         plain(file.generator()),
-        seen.map.faces.len(),
-        opaque,
-        veils
+        seen.faces().len(),
     );
     for source in sources {
         text += &format!("  made of   {}\n", plain(source));
     }
-    for guest in &seen.guests {
-        let (name, [width, height]) = (plain(guest.name()), guest.grid().size);
-        let (kind, samples) = (kind_name(guest.kind()), guest.samples().len());
-        text +=
-            &format!("  guest     {name}: {kind}, {width} x {height} pixels, {samples} samples\n");
+    if let Stored::Regions(seen) = seen {
+        for guest in &seen.guests {
+            let (name, [width, height]) = (plain(guest.name()), guest.grid().size);
+            let (kind, samples) = (kind_name(guest.kind()), guest.samples().len());
+            text += &format!(
+                "  guest     {name}: {kind}, {width} x {height} pixels, {samples} samples\n"
+            );
+        }
     }
-    text += &model::as_text(&seen.scene, all);
+    let mut casters: Vec<String> = Vec::new();
+    if file.has_embedded_casters() {
+        casters.push("kept in the file".into());
+    }
+    casters.extend(
+        again
+            .iter()
+            .map(|path| format!("read again from {}", plain(path))),
+    );
+    if !file.tells_casters() {
+        casters.push("not told".into());
+    }
+    text += &format!("  casters   {}\n", casters.join("; "));
+    text += &model::as_text(seen.scene(), all);
     (told, text)
 }
 

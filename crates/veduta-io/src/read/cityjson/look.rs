@@ -3,7 +3,7 @@
 use super::document::{Appearance, Document, Geometry, Ordered, Texture};
 use super::nested::Item;
 use crate::read::error::{Fault, Place, Problem, Warnings};
-use crate::read::files::{read_whole, shortened};
+use crate::read::files::{ReadFiles, shortened};
 use crate::read::picture::PictureDecoder;
 use crate::tone::linear_from_srgb;
 use std::collections::HashMap;
@@ -20,6 +20,8 @@ pub struct Look<'a> {
     decoder: PictureDecoder,
     /// Pictures by name; nothing for those that cannot be had.
     decoded: HashMap<String, Option<ImageId>>,
+    /// The files of pictures.
+    pub files: ReadFiles,
     /// How many pictures cannot be had, and why the first.
     lost: Option<(usize, String)>,
 }
@@ -93,6 +95,7 @@ impl<'a> Look<'a> {
             material_of_name: HashMap::new(),
             decoder: PictureDecoder::new(),
             decoded: HashMap::new(),
+            files: ReadFiles::default(),
             lost: None,
         }
     }
@@ -202,7 +205,8 @@ impl<'a> Look<'a> {
         let decoded = if name.contains("://") {
             Err("is not a path to a file; download it and put it beside the model".into())
         } else {
-            read_whole(&self.folder.join(name))
+            self.files
+                .read(&self.folder.join(name))
                 .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
                 .and_then(|bytes| self.decoder.decode(name, &bytes))
         };

@@ -484,6 +484,7 @@ impl City<'_, '_, '_> {
     fn finish(self, crs: Option<&str>) -> Scene {
         self.shared.losses.report(self.warnings);
         self.shared.look.report(self.warnings);
+        self.budget.files.append(self.shared.look.files.finish());
         let crs = crs.map(crs_name);
         if crs.as_deref().is_some_and(|crs| GEOGRAPHIC.contains(&crs)) {
             let message = "coordinates are degrees, which are shown as if they were metres; \

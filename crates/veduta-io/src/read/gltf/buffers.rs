@@ -3,7 +3,7 @@
 use super::document::{Buffer, BufferView, Document, Index};
 use super::{Fault, Problem, row};
 use crate::read::budget::Budget;
-use crate::read::files::{read_whole, shortened};
+use crate::read::files::shortened;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -40,7 +40,7 @@ impl Files {
         if let Some(bytes) = self.read.get(&path) {
             return Ok(Rc::clone(bytes));
         }
-        let bytes: Rc<Vec<u8>> = match read_whole(&path) {
+        let bytes: Rc<Vec<u8>> = match budget.files.read(&path) {
             Ok(bytes) => bytes.into(),
             Err(source) => return Err(Problem::NotThere { path, source }),
         };

@@ -17,6 +17,7 @@ mod smooth;
 
 use super::budget::Budget;
 use super::error::{Fault, Place, Problem, Warnings};
+use super::files::ReadFiles;
 use super::finish::finish_mesh;
 use assemble::Assembler;
 use mtl::Library;
@@ -40,7 +41,7 @@ pub(crate) fn read(
     }
     smooth::give_normals(&mut parsed);
     let mut scene = Scene::default();
-    let material_ids = read_materials(path, &parsed, &mut scene, warnings);
+    let material_ids = read_materials(path, &parsed, &mut scene, &mut budget.files, warnings);
 
     let mut runs_of_group: Vec<Vec<(Run, usize)>> = vec![Vec::new(); parsed.groups.len()];
     let ends = parsed.runs.iter().skip(1).map(|run| run.first);
@@ -74,6 +75,7 @@ fn read_materials(
     path: &Path,
     parsed: &Parsed,
     scene: &mut Scene,
+    files: &mut ReadFiles,
     warnings: &mut Warnings,
 ) -> Vec<MaterialId> {
     let mut library = Library::new(path.parent().unwrap_or(Path::new("")));
@@ -107,6 +109,7 @@ fn read_materials(
         let message = "names materials but no library of them; they are shown plain";
         warnings.add(Place::Whole, message);
     }
+    files.append(library.files.finish());
     scene.images = library.images;
     ids
 }

@@ -4,7 +4,7 @@
 //! linear. Faces are seen from both sides: OBJ knows no back.
 
 use crate::read::error::{Place, Problem, Warnings};
-use crate::read::files::read_whole;
+use crate::read::files::ReadFiles;
 use crate::read::picture::PictureDecoder;
 use crate::read::text::{Tokens, text};
 use std::collections::HashMap;
@@ -21,6 +21,8 @@ pub struct Library<'a> {
     decoded: HashMap<PathBuf, Option<ImageId>>,
     /// The pictures decoded so far.
     pub images: Vec<Image>,
+    /// The files of libraries and pictures.
+    pub files: ReadFiles,
 }
 
 /// A material as its library says.
@@ -53,13 +55,14 @@ impl<'a> Library<'a> {
             decoder: PictureDecoder::new(),
             decoded: HashMap::new(),
             images: Vec::new(),
+            files: ReadFiles::default(),
         }
     }
 
     /// Adds the materials of `names`, the rest of a `mtllib` line: one name with spaces in it, or
     /// several. `line` is its place in the OBJ file. A library that is not there is warned of.
     pub fn add(&mut self, names: &str, line: u64, warnings: &mut Warnings) {
-        match find(self.folder, names) {
+        match find(&mut self.files, self.folder, names) {
             Ok((path, bytes)) => self.parse(&path, &bytes, warnings),
             Err(_) if names.contains(' ') => {
                 for name in names.split_whitespace() {
@@ -152,7 +155,7 @@ impl<'a> Library<'a> {
         let image = match self.decoded.get(&path) {
             Some(&known) => known,
             None => {
-                let decoded = find(self.folder, &map.name)
+                let decoded = find(&mut self.files, self.folder, &map.name)
                     .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
                     .and_then(|(_, bytes)| self.decoder.decode(&map.name, &bytes));
                 let image = match decoded {
@@ -275,9 +278,9 @@ fn unit(mut tokens: Tokens<'_>) -> Result<f64, Problem> {
 }
 
 /// Reads the file called `name`, as written or as the writer's system would have meant it.
-fn find(folder: &Path, name: &str) -> std::io::Result<(PathBuf, Vec<u8>)> {
+fn find(files: &mut ReadFiles, folder: &Path, name: &str) -> std::io::Result<(PathBuf, Vec<u8>)> {
     let path = folder.join(name);
-    let first = read_whole(&path);
+    let first = files.read(&path);
     let error = match first {
         Ok(bytes) => return Ok((path, bytes)),
         Err(error) => error,
@@ -287,7 +290,7 @@ fn find(folder: &Path, name: &str) -> std::io::Result<(PathBuf, Vec<u8>)> {
     let last = slashed.rsplit('/').next().unwrap_or_default().to_owned();
     for other in [slashed, last] {
         let path = folder.join(other);
-        if let Ok(bytes) = read_whole(&path) {
+        if let Ok(bytes) = files.read(&path) {
             return Ok((path, bytes));
         }
     }

@@ -14,7 +14,6 @@ mod tables;
 
 use super::budget::Budget;
 use super::error::{Fault, Place, Problem, Warnings};
-use super::files::read_whole;
 use super::finish::{finish_mesh, push_face};
 use super::picture::PictureDecoder;
 use super::polygon::{Cut, Polygon, PolygonCutter, usual_rounding};
@@ -58,7 +57,9 @@ pub(crate) fn read(
         .first()
         .filter(|_| !mesh.texcoords.is_empty())
     {
-        let decoded = read_whole(&path.parent().unwrap_or(Path::new("")).join(texture))
+        let decoded = budget
+            .files
+            .read(&path.parent().unwrap_or(Path::new("")).join(texture))
             .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
             .and_then(|bytes| PictureDecoder::new().decode(texture, &bytes));
         match decoded {

@@ -3,7 +3,9 @@
 use crate::read::budget::Budget;
 use crate::read::error::Problem;
 use std::collections::BTreeSet;
+use std::io;
 use std::path::{Path, PathBuf};
+use veduta::map::Source;
 use veduta::scene::{Mesh, Object, Scene};
 
 /// Scene files within scene files, so deep; deeper would only be a way to use up the stack.
@@ -65,6 +67,23 @@ impl Inclusion {
     /// Ends what [`Inclusion::enter`] began.
     pub fn leave(&mut self) {
         self.chain.pop();
+    }
+
+    /// A file's bytes. It justifies memory once.
+    pub fn read(&mut self, file: &Path) -> io::Result<Vec<u8>> {
+        let bytes = self.budget.files.read(file)?;
+        self.add_input(file, bytes.len());
+        Ok(bytes)
+    }
+
+    /// Says which files a model was read from.
+    pub fn append_files(&mut self, files: Vec<Source>) {
+        self.budget.files.append(files);
+    }
+
+    /// All files that were read.
+    pub fn finish(self) -> Vec<Source> {
+        self.budget.files.finish()
     }
 
     /// Says that a file of `length` bytes has been read. A file justifies memory once.

@@ -20,7 +20,7 @@ use super::inclusion::Inclusion;
 use super::source::{Faults, Source, Span};
 use super::value::Name;
 use crate::read::error::{Place, Problem, ReadError, Warnings};
-use crate::read::files::{read_whole, shortened};
+use crate::read::files::shortened;
 use crate::read::finish::REACH;
 use crate::read::names::{closest, unique};
 use std::borrow::Cow;
@@ -42,8 +42,8 @@ pub fn read(
     warnings: &mut Warnings,
 ) -> Result<Vec<Instance>, ReadError> {
     let whole = |problem: Problem| problem.at(Place::Whole).of(path);
-    let bytes = read_whole(path).map_err(|error| whole(Problem::Unreadable(error)))?;
-    inclusion.add_input(path, bytes.len());
+    let bytes = inclusion.read(path);
+    let bytes = bytes.map_err(|error| whole(Problem::Unreadable(error)))?;
     let source = Source::new(path, &bytes)?;
     let mut faults = Faults::default();
     let mut lines = lines(source.text);

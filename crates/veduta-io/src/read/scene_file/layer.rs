@@ -170,6 +170,7 @@ pub fn read(
         } else {
             read_model(&layer.model, &layer.options)?
         };
+        inclusion.append_files(std::mem::take(&mut loaded.files));
         let charged = inclusion.charge_model(&layer.model, &loaded.scene);
         charged.map_err(here)?;
         warnings.append(std::mem::take(&mut loaded.warnings));

@@ -6,7 +6,6 @@ use super::inclusion::Inclusion;
 use super::source::{Faults, Source, Span};
 use super::{find_file, value::Text};
 use crate::read::error::{Place, ReadError, Warnings};
-use crate::read::files::read_whole;
 use crate::read::names::closest;
 use crate::read::picture::PictureDecoder;
 use glob::{MatchOptions, Pattern};
@@ -198,12 +197,10 @@ impl Pictures {
         if let Some(&known) = self.known.get(&path) {
             return Ok(known);
         }
-        let decoded = read_whole(&path)
+        let decoded = inclusion
+            .read(&path)
             .map_err(|error| format!("cannot be read: {}", crate::reason(&error)))
-            .and_then(|bytes| {
-                inclusion.add_input(&path, bytes.len());
-                self.decoder.decode(named, &bytes)
-            });
+            .and_then(|bytes| self.decoder.decode(named, &bytes));
         let image = match decoded {
             Ok(image) => {
                 let charged = inclusion.charge_picture(image.pixels.len());

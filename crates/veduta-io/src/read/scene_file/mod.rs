@@ -25,7 +25,7 @@ mod value;
 
 use super::error::{Place, Problem, ReadError, Warning, Warnings};
 use super::names::neighbour;
-use super::{Loaded, ReadOptions, files, finish};
+use super::{Loaded, ReadOptions, finish};
 use document::{Changes, Document};
 use form::{Form, Node};
 use inclusion::Inclusion;
@@ -58,18 +58,22 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadErr
     inclusion
         .enter(path)
         .map_err(|problem| problem.at(Place::Whole).of(path))?;
-    read_included(path, options, &mut inclusion)
+    let loaded = read_included(path, options, &mut inclusion)?;
+    Ok(Loaded {
+        files: inclusion.finish(),
+        ..loaded
+    })
 }
 
-/// Reads a scene file that `inclusion` knows to be read.
+/// Reads a scene file that `inclusion` knows to be read; all its files are told to that.
 fn read_included(
     path: &Path,
     options: &ReadOptions,
     inclusion: &mut Inclusion,
 ) -> Result<Loaded, ReadError> {
     let whole = |problem: Problem| problem.at(Place::Whole).of(path);
-    let bytes = files::read_whole(path).map_err(|error| whole(Problem::Unreadable(error)))?;
-    inclusion.add_input(path, bytes.len());
+    let bytes = inclusion.read(path);
+    let bytes = bytes.map_err(|error| whole(Problem::Unreadable(error)))?;
     let source = Source::new(path, &bytes)?;
     let document: Document = read_form("a scene file", &source)?;
 
@@ -110,6 +114,7 @@ fn read_included(
     Ok(Loaded {
         scene,
         warnings: warnings.finish(),
+        files: Vec::new(),
         default_camera,
         picture_sizes,
     })

@@ -1,42 +1,46 @@
 //! Spans -> pixels: "Regeneration of images" in Nakamae et al. (1989).
 
-use super::{ROWS_PER_BAND, Span, Spans};
+use super::ROWS_PER_BAND;
 use crate::accumulate::Picture;
 use rayon::prelude::*;
 use std::ops::Range;
-use veduta_map::FaceId;
+use veduta_map::{FaceId, Span, Spans};
 
-impl Spans {
-    /// The picture of faces that each have one colour (linear, premultiplied by opacity).
-    ///
-    /// Nakamae et al., "Regeneration of images": the trapezoidal rule of eq. (1) and (2) down each
-    /// row, with lengths cut at the pixels' borders, eq. (3) to (6).
-    pub fn picture(&self, color: impl Fn(FaceId) -> [f32; 4] + Sync) -> Picture {
-        let (width, n) = (self.width() as usize, self.sub_scanlines_per_row());
-        let mut pixels = vec![[0.0; 4]; width * self.height() as usize];
-        let weight = 1.0 / n as f32;
-        pixels
-            .par_chunks_mut(width * ROWS_PER_BAND as usize)
-            .enumerate()
-            .for_each(|(band, rows)| {
-                let first = band as u32 * ROWS_PER_BAND * n;
-                let mut line = LineIntensity::new(width);
-                line.scan(self.sub_scanline(first), &color);
-                for (row, pixels) in rows.chunks_exact_mut(width).enumerate() {
-                    let first = first + row as u32 * n;
-                    // Sub-scanline 0 of this row is sub-scanline n of the one above.
-                    line.add_to(pixels, 0.5 * weight);
-                    for j in 1..=n {
-                        line.scan(self.sub_scanline(first + j), &color);
-                        line.add_to(pixels, if j == n { 0.5 * weight } else { weight });
-                    }
+/// The picture of faces that each have one colour (linear, premultiplied by opacity).
+///
+/// Nakamae et al., "Regeneration of images": the trapezoidal rule of eq. (1) and (2) down each row, with
+/// lengths cut at the pixels' borders, eq. (3) to (6).
+pub fn picture(spans: &Spans, color: impl Fn(FaceId) -> [f32; 4] + Sync) -> Picture {
+    let width = spans.width() as usize;
+    let mut pixels = vec![[0.0; 4]; width * spans.height() as usize];
+    pixels
+        .par_chunks_mut(width * ROWS_PER_BAND as usize)
+        .enumerate()
+        .for_each(|(band, rows)| {
+            let first_row = band as u32 * ROWS_PER_BAND;
+            let mut line = LineIntensity::new(width);
+            line.scan(
+                spans.sub_scanline(*spans.lines_of_row(first_row).start()),
+                &color,
+            );
+            for (row, pixels) in (first_row..).zip(rows.chunks_exact_mut(width)) {
+                let (first, last) = spans.lines_of_row(row).into_inner();
+                if first == last {
+                    continue;
                 }
-            });
-        Picture {
-            width: self.width(),
-            height: self.height(),
-            pixels,
-        }
+                let weight = 1.0 / (last - first) as f32;
+                // Sub-scanline 0 of this row is sub-scanline n of the one above.
+                line.add_to(pixels, 0.5 * weight);
+                for j in first + 1..=last {
+                    line.scan(spans.sub_scanline(j), &color);
+                    line.add_to(pixels, if j == last { 0.5 * weight } else { weight });
+                }
+            }
+        });
+    Picture {
+        width: spans.width(),
+        height: spans.height(),
+        pixels,
     }
 }
 

@@ -4,44 +4,17 @@
 //! any scanline algorithm; but x is computed from the side's upper end, not summed step by step, so
 //! that it depends neither on where a band begins nor on which of two neighbours asks.
 
-use super::sweep::Sweep;
-use super::{ROWS_PER_BAND, Span};
+use super::ROWS_PER_BAND;
+use crate::sweep::{LeftEnd, Segment, Sweep};
 use rayon::prelude::*;
-use std::cmp::Ordering;
-use veduta_geometry::{Affine, DVec2};
-use veduta_map::{FaceId, Faces};
+use veduta_geometry::DVec2;
+use veduta_map::{FaceId, Faces, Span, SpanBand};
 
 /// Faces whose extent a task finds at a time.
 const FACES_PER_TASK: usize = 16 * 1024;
 
-/// The spans of some rows.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Band {
-    first: u32,
-    spans: Vec<Span>,
-    /// `starts[k]..starts[k + 1]` are the spans of sub-scanline `first + k`.
-    starts: Vec<u32>,
-}
-
-impl Band {
-    pub(super) fn sub_scanline(&self, index: u32) -> &[Span] {
-        let k = (index - self.first) as usize;
-        &self.spans[self.starts[k] as usize..self.starts[k + 1] as usize]
-    }
-
-    /// The faces of its spans, of neighbours once.
-    pub(super) fn faces(&self) -> impl Iterator<Item = FaceId> {
-        let runs = self.spans.chunk_by(|a, b| a.face == b.face);
-        runs.map(|spans| spans[0].face)
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.spans.len()
-    }
-}
-
 /// Scans all bands, each on its own: what is found on a sub-scanline does not depend on the others.
-pub(super) fn bands(faces: &Faces, width: u32, height: u32, n: u32) -> Vec<Band> {
+pub(super) fn bands(faces: &Faces, width: u32, height: u32, n: u32) -> Vec<SpanBand> {
     let heights = heights(height, n);
     let per_band = ROWS_PER_BAND * n;
     let entries = Entries::new(faces, &heights, per_band);
@@ -190,23 +163,29 @@ impl Edge {
 
 /// A face that crosses the sub-scanline.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ActiveFace {
-    pub(super) face: FaceId,
+struct ActiveFace {
+    segment: Segment,
     /// The sub-scanline after its last.
     end: u32,
-    /// Where it ends on the present sub-scanline.
-    pub(super) right: f64,
-    pub(super) nearness: Affine,
     sides: [Edge; 2],
+}
+
+impl AsRef<Segment> for ActiveFace {
+    #[inline(always)]
+    fn as_ref(&self) -> &Segment {
+        &self.segment
+    }
 }
 
 impl ActiveFace {
     fn new(faces: &Faces, face: FaceId, end: u32, y: f64) -> Self {
         Self {
-            face,
+            segment: Segment {
+                face,
+                right: 0.0,
+                nearness: *faces.face_nearness(face),
+            },
             end,
-            right: 0.0,
-            nearness: *faces.face_nearness(face),
             sides: sides_at(faces.outline(face), y),
         }
     }
@@ -215,9 +194,9 @@ impl ActiveFace {
     #[inline]
     fn go_to(&mut self, faces: &Faces, y: f64) -> f64 {
         if y >= self.sides[0].bottom_y.min(self.sides[1].bottom_y) {
-            self.sides = sides_at(faces.outline(self.face), y);
+            self.sides = sides_at(faces.outline(self.segment.face), y);
         }
-        self.right = self.sides[1].x_at(y);
+        self.segment.right = self.sides[1].x_at(y);
         self.sides[0].x_at(y)
     }
 }
@@ -240,35 +219,18 @@ fn sides_at(outline: &[DVec2], y: f64) -> [Edge; 2] {
     sides
 }
 
-/// A segment's left end, for sorting; equal ends are in the order of faces.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LeftEnd {
-    pub(super) x: f64,
-    face: FaceId,
-    /// Index of the face in the table of active faces.
-    pub(super) slot: u32,
-}
-
-impl LeftEnd {
-    #[inline]
-    fn order(&self, other: &Self) -> Ordering {
-        self.x.total_cmp(&other.x).then(self.face.cmp(&other.face))
-    }
-}
-
 fn scan_band(
     faces: &Faces,
     heights: &[f64],
     entries: &Entries,
     lines: std::ops::Range<u32>,
     width: f64,
-) -> Band {
-    let mut band = Band {
+) -> SpanBand {
+    let mut band = SpanBand {
         first: lines.start,
         spans: Vec::new(),
-        starts: Vec::with_capacity(lines.len() + 1),
+        ends: Vec::with_capacity(lines.len()),
     };
-    band.starts.push(0);
     let mut active: Vec<ActiveFace> = Vec::new();
     let mut free: Vec<u32> = Vec::new();
     let mut left_ends: Vec<LeftEnd> = Vec::new();
@@ -306,7 +268,7 @@ fn scan_band(
             }
         });
         let end = u32::try_from(band.spans.len()).expect("at most u32::MAX spans in a band");
-        band.starts.push(end);
+        band.ends.push(end);
     }
     band
 }

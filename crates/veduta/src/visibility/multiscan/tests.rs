@@ -2,7 +2,7 @@ use super::*;
 use crate::scene::generate;
 use crate::visibility::project;
 use veduta_geometry::{Affine, DVec2, signed_area};
-use veduta_map::ObjectId;
+use veduta_map::{FaceId, ObjectId};
 
 /// Faces of the given outlines and nearness.
 fn faces(outlines: &[(&[[f64; 2]], Affine)]) -> Faces {
@@ -79,7 +79,7 @@ fn upright_edges_are_exact_at_once() {
     let outline: &[[f64; 2]] = &[[0.137, 0.0], [0.7613, 0.0], [0.7613, 1.0], [0.137, 1.0]];
     let spans = find_spans(&faces(&[(outline, LEVEL)]), 16, 9, 1);
     let (left, right) = (0.137_f64 * 16.0, 0.7613_f64 * 16.0);
-    let picture = spans.picture(|_| WHITE);
+    let picture = super::picture(&spans, |_| WHITE);
     for (index, pixel) in picture.pixels.iter().enumerate() {
         let column = (index % 16) as f64;
         let exact = (right.min(column + 1.0) - left.max(column)).max(0.0);
@@ -94,7 +94,8 @@ fn upright_edges_are_exact_at_once() {
 fn a_picture_wholly_covered_is_wholly_opaque() {
     let outline: &[[f64; 2]] = &[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     for (n, height) in [(1, 1), (3, 7), (5, 32), (2, 33), (7, 64)] {
-        let picture = find_spans(&faces(&[(outline, LEVEL)]), 11, height, n).picture(|_| WHITE);
+        let spans = find_spans(&faces(&[(outline, LEVEL)]), 11, height, n);
+        let picture = super::picture(&spans, |_| WHITE);
         for pixel in &picture.pixels {
             assert!(
                 (pixel[3] - 1.0).abs() < 1e-6,
@@ -110,7 +111,7 @@ fn the_sub_scanline_between_two_rows_counts_half_in_both() {
     let outline: &[[f64; 2]] = &[[0.0, 0.2], [1.0, 0.2], [1.0, 0.3], [0.0, 0.3]];
     let spans = find_spans(&faces(&[(outline, LEVEL)]), 1, 4, 2);
     assert_eq!(spans.len(), 1);
-    let picture = spans.picture(|_| WHITE);
+    let picture = super::picture(&spans, |_| WHITE);
     let seen: Vec<f32> = picture.pixels.iter().map(|pixel| pixel[0]).collect();
     assert_eq!(seen, [0.25, 0.25, 0.0, 0.0]);
 }
@@ -211,7 +212,7 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
             pool.expect("a pool of threads").install(|| {
                 let spans = find_spans(&faces, 200, 150, 3);
                 let color = |face: FaceId| [face.0 as f32 * 0.013, 0.5, 0.25, 1.0];
-                let picture = spans.picture(color);
+                let picture = super::picture(&spans, color);
                 (spans, picture)
             })
         };
@@ -230,7 +231,8 @@ fn wires_along_the_rows_are_lost_or_too_bright() {
     // Tanaka & Takahashi (1991), §5.2 and Fig. 6: seven sub-scanlines between those on the pixels'
     // borders still miss some of the 0.05 px wires, and those they meet are an eighth of a pixel.
     let made = generate::by_name("mesh0").expect("a generated scene");
-    let picture = find_spans(&project(&made.scene, &made.camera), 512, 512, 8).picture(|_| WHITE);
+    let spans = find_spans(&project(&made.scene, &made.camera), 512, 512, 8);
+    let picture = super::picture(&spans, |_| WHITE);
     // Between two wires of the other set, light summed over the wire's rows or columns.
     let across = |wire: u32, along_rows: bool| {
         let centre = 256.0 + (f64::from(wire) - 12.0) * 20.1;
