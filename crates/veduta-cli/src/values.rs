@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use veduta::pipeline::Sampling;
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::PictureFormat;
 use veduta_io::tone::{Exposure, linear_from_srgb};
+use veduta_io::{PictureFormat, is_map};
 
 /// Size of a picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -214,15 +214,20 @@ pub enum Background {
     Color([f32; 3]),
     /// The picture in this file.
     Picture(PathBuf),
+    /// The stored map in this file.
+    Map(PathBuf),
 }
 
 impl FromStr for Background {
     type Err = String;
 
-    /// `none`, `#rgb` or `#rrggbb` (sRGB), or a file with the suffix of a picture.
+    /// `none`, `#rgb` or `#rrggbb` (sRGB), or a file with the suffix of a picture or a stored map.
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "none" {
             return Ok(Self::None);
+        }
+        if is_map(Path::new(text)) {
+            return Ok(Self::Map(PathBuf::from(text)));
         }
         if PictureFormat::of(Path::new(text)).is_ok() {
             return Ok(Self::Picture(PathBuf::from(text)));

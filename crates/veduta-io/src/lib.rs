@@ -20,6 +20,8 @@ mod casters;
 pub mod deep_exr;
 #[cfg(feature = "exr")]
 pub mod depth_picture;
+#[cfg(feature = "exr")]
+mod guest;
 mod map_file;
 mod object_names;
 #[cfg(any(
@@ -49,6 +51,8 @@ pub use casters::{
     CastersError, SourceError, SourceProblem, check_source, choose_objects, read_casters,
     reading_of,
 };
+#[cfg(feature = "exr")]
+pub use guest::{GuestOptions, GuestProblem, LoadedGuest, read_guest};
 pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, write_map, write_spans};
 pub use object_names::ObjectNames;
 #[cfg(any(

@@ -1,19 +1,25 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
 //! the light, `pipeline/deep.rs` for deep pictures, `pipeline/filtered.rs` for filters that reach beyond
-//! the pixel, `pipeline/frames.rs` for animations and `pipeline/local.rs` for parts of pictures.
+//! the pixel, `pipeline/frames.rs` for animations, `pipeline/local.rs` for parts of pictures, and
+//! `pipeline/guests.rs` and `pipeline/mattes.rs` for what is only in composites.
 
 mod aovs;
 mod deep;
 mod filtered;
 mod frames;
+mod guests;
 mod local;
+mod mattes;
 
 pub use deep::{deep_window, render_deep};
 pub use frames::{Extent, FrameStep, FrameWork, Frames};
 pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
-use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer, VeilBuffers};
+use crate::dice::{
+    self, BAND_ROWS, Bands, Dicer, GuestBuffers, GuestLight, Parts, PixelGrid, SpanDicer,
+    VeilBuffers,
+};
 use crate::drawing::{self, Drawing, Evenness, Look};
 use crate::filter::Filter;
 use crate::scene::{Opacities, Opacity, Scene};
@@ -22,11 +28,15 @@ use crate::shade::{Radiance, Surfaces, Textures};
 use crate::visibility::multiscan;
 use crate::visibility::{self, Seen, Strips, speculative};
 use aovs::{AovBuffers, AovMaker};
+use guests::GuestLayers;
+use mattes::without_mattes;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
 use veduta_map::{
-    Camera, FaceId, Faces, MaterialId, SeenSpans, Spans, TooFewSubScanlines, VisibilityMap,
+    Camera, FaceId, Faces, Guest, MaterialId, SeenScene, SeenSpans, Spans, TooFewSubScanlines,
+    VisibilityMap,
 };
 
 /// How a picture is made.
@@ -226,9 +236,44 @@ pub fn render_channels(
     filter: Filter,
     aovs: AovSettings,
 ) -> (Picture, Aovs) {
+    render_with_guests(scene, map, &[], grid, unlit, filter, aovs)
+}
+
+/// [`render_channels`] of a stored map with its guests. Channels beside the light are of the map alone, as
+/// far as guests do not hide it.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory, or guests are to be seen by another filter than the
+/// box: they are laid into pixels.
+pub fn render_seen(
+    seen: &SeenScene,
+    grid: &PixelGrid,
+    unlit: bool,
+    filter: Filter,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
+    let SeenScene {
+        scene, map, guests, ..
+    } = seen;
+    assert!(
+        filter == Filter::Box || guests.is_empty(),
+        "guests are laid into pixels by area"
+    );
+    render_with_guests(scene, map, guests, grid, unlit, filter, aovs)
+}
+
+fn render_with_guests(
+    scene: &Scene,
+    map: &VisibilityMap,
+    guests: &[Guest],
+    grid: &PixelGrid,
+    unlit: bool,
+    filter: Filter,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
     let textures = Textures::new(scene, &materials_seen(scene, map));
     let mut canvas = Canvas::new(grid, filter, aovs);
-    canvas.paint_map(scene, &textures, map, grid, unlit, 0);
+    canvas.paint_map(scene, &textures, map, guests, grid, unlit, 0);
     (canvas.picture, canvas.aovs)
 }
 
@@ -256,15 +301,27 @@ impl Canvas {
     }
 
     /// Makes the pixels of `grid`, which are those of the picture from row `first_row` on.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one caller with and one without guests"
+    )]
     fn paint_map(
         &mut self,
         scene: &Scene,
         textures: &Textures,
         map: &VisibilityMap,
+        guests: &[Guest],
         grid: &PixelGrid,
         unlit: bool,
         first_row: usize,
     ) {
+        let guests = (!guests.is_empty()).then(|| GuestLayers::new(scene, map, guests, grid));
+        // Mattes hide guests too, and are left out after that.
+        let map = match guests {
+            Some(_) => Cow::Borrowed(map),
+            None => without_mattes(scene, map),
+        };
+        let map = &*map;
         let shown = map.shown_faces();
         let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
         let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
@@ -277,12 +334,18 @@ impl Canvas {
         let dice = |band: usize, buffers: &mut BandBuffers| {
             let BandBuffers { dicer, parts, .. } = buffers;
             dice::dice(map, &bands, band, varies, dicer, parts);
+            if let Some(guests) = &guests {
+                guests.touch(bands.rows(band), &mut buffers.guests, parts);
+            }
         };
         let kernel = self.filter.kernel();
         // Channels are those of pixels, and made with the light by area, which a kernel's replaces.
         if kernel.is_none() || maker.is_some() {
-            let veiled = (!map.veils.is_empty()).then_some(map);
-            self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
+            let blended = Blended {
+                veiled: (!map.veils.is_empty()).then_some(map),
+                guests: guests.as_ref(),
+            };
+            self.paint(&surfaces, maker.as_ref(), blended, grid, first_row, dice);
         }
         if let Some(kernel) = &kernel {
             let first = first_row * grid.width as usize;
@@ -308,13 +371,12 @@ impl Canvas {
             .then(|| AovMaker::new(scene, textures, camera, faces, shown, settings))
     }
 
-    /// Makes the bands of `grid` from their parts, which `dice` finds; of the map `veiled` if there are
-    /// veils among them.
+    /// Makes the bands of `grid` from their parts, which `dice` finds, and what is blended with them.
     fn paint(
         &mut self,
         surfaces: &Surfaces,
         maker: Option<&AovMaker>,
-        veiled: Option<&VisibilityMap>,
+        blended: Blended,
         grid: &PixelGrid,
         first_row: usize,
         dice: impl Fn(usize, &mut BandBuffers) + Sync,
@@ -329,7 +391,7 @@ impl Canvas {
             |buffers, (band, light)| {
                 dice(band, buffers);
                 let row = band as u32 * BAND_ROWS;
-                buffers.finish(surfaces, veiled, grid, row, light);
+                buffers.finish(surfaces, blended, grid, row, light);
                 if let Some(maker) = maker {
                     let (parts, aov_buffers) = (&buffers.parts, &mut buffers.aovs);
                     let part = maker.make(parts, grid, row, light.len(), aov_buffers);
@@ -353,6 +415,7 @@ pub fn draw_window(
     unlit: bool,
     settings: &drawing::Settings,
 ) -> Drawing {
+    let map = &*without_mattes(scene, map);
     let looks = looks(scene, map, grid, unlit);
     drawing::draw(scene, map, &looks, grid, settings)
 }
@@ -510,13 +573,20 @@ fn paint_spans(
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
     let mut canvas = Canvas::new(grid, Filter::Box, aovs);
     let maker = canvas.maker(scene, &textures, camera, faces, &shown);
+    let are_seen = scene.are_seen();
     let dice = |band: usize, buffers: &mut BandBuffers| {
         let first = band as u32 * BAND_ROWS;
         let rows = first..(first + BAND_ROWS).min(grid.height);
         let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
         dice::dice_spans(spans, rows, fragment_of, dicer, parts);
+        if let Some(are_seen) = &are_seen {
+            let is_seen = |fragment: u32| are_seen[faces.object(shown[fragment as usize]).index()];
+            parts.boundary.retain(|part| is_seen(part.fragment));
+            parts.runs.retain(|run| is_seen(run.fragment));
+        }
     };
-    canvas.paint(&surfaces, maker.as_ref(), None, grid, 0, dice);
+    let blended = Blended::default();
+    canvas.paint(&surfaces, maker.as_ref(), blended, grid, 0, dice);
     (canvas.picture, canvas.aovs)
 }
 
@@ -557,7 +627,7 @@ fn render_strips(
         let map = map_of(camera, strips.cut(strip).faces, strips.extent(strip));
         let [first, end] = [rows[strip], rows[strip + 1]];
         let grid = frame.window(0.0, first as f64, frame.width, (end - first) as u32);
-        canvas.paint_map(scene, &textures, &map, &grid, settings.unlit, first);
+        canvas.paint_map(scene, &textures, &map, &[], &grid, settings.unlit, first);
     }
     // What is found from the scene itself is shown as it is.
     Rendered {
@@ -574,6 +644,8 @@ struct BandBuffers {
     span_dicer: SpanDicer,
     parts: Parts,
     veils: VeilBuffers,
+    guests: GuestBuffers,
+    guest_light: Vec<GuestLight>,
     radiance: Radiance,
     sums: Vec<[f64; 4]>,
     aovs: AovBuffers,
@@ -622,23 +694,51 @@ impl BandBuffers {
         of_fragments.map(sum_up).collect()
     }
 
-    /// Shades the parts of a band that begins at `first_row`, puts the veils of the map `veiled` before
-    /// them, and sums them up.
+    /// Shades the parts of a band that begins at `first_row`, puts before them and between them what is
+    /// blended with them, and sums all up.
     fn finish(
         &mut self,
         surfaces: &Surfaces,
-        veiled: Option<&VisibilityMap>,
+        blended: Blended,
         grid: &PixelGrid,
         first_row: u32,
         pixels: &mut [[f32; 4]],
     ) {
-        surfaces.shade(&self.parts, grid, first_row, &mut self.radiance);
-        if let Some(map) = veiled {
-            let (opacities, parts) = (&self.radiance.opacities, &mut self.parts);
-            dice::attenuate(map, grid, first_row, opacities, &mut self.veils, parts);
+        let Self {
+            parts,
+            veils,
+            guests,
+            guest_light,
+            radiance,
+            sums,
+            ..
+        } = self;
+        surfaces.shade(parts, grid, first_row, radiance);
+        let opacities = &radiance.opacities;
+        let mut attenuate = |parts: &mut Parts| {
+            if let Some(map) = blended.veiled {
+                dice::attenuate(map, grid, first_row, opacities, veils, parts);
+            }
+        };
+        match blended.guests {
+            Some(layers) => {
+                layers.lay(first_row, opacities, guests, parts, guest_light, attenuate);
+            }
+            None => attenuate(parts),
         }
-        accumulate::box_filter(&self.parts, &self.radiance, &mut self.sums, pixels);
+        accumulate::box_filter(parts, radiance, sums, pixels);
+        if blended.guests.is_some() {
+            accumulate::add_guests(guest_light, pixels);
+        }
     }
+}
+
+/// What is blended with the parts of opaque fragments.
+#[derive(Clone, Copy, Default)]
+struct Blended<'a> {
+    /// The map, if it has veils.
+    veiled: Option<&'a VisibilityMap>,
+    guests: Option<&'a GuestLayers<'a>>,
 }
 
 fn material_of(scene: &Scene, faces: &Faces, face: FaceId) -> MaterialId {

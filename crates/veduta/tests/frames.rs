@@ -5,7 +5,7 @@ use veduta::dice::{Coverage, PixelGrid, coverage};
 use veduta::map::{Camera, SeenScene};
 use veduta::pipeline::{Extent, Frames, find_visibility, render_window};
 use veduta::scene::generate::by_name;
-use veduta::scene::{AlphaMode, Layer, MeshId, Object, Scene};
+use veduta::scene::{AlphaMode, Layer, MeshId, Object, Scene, Shown};
 use veduta_geometry::{DMat4, DVec3};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -40,6 +40,7 @@ fn layered(names: &[&str]) -> (Scene, Camera) {
             name: name.into(),
             priority: 0,
             objects: first..scene.objects.len() as u32,
+            shown: Shown::Seen,
         });
     }
     (scene, camera.expect("there is a scene"))

@@ -61,7 +61,7 @@ fn windows_made_again_are_the_whole_picture_there_and_nothing_elsewhere() {
         for (columns, rows) in windows {
             let region = Region::window(&grid, columns.clone(), rows.clone());
             let mut picture = blank(&grid);
-            render_region(&scene, &map, &grid, &region, false, &mut picture);
+            render_region(&scene, &map, &[], &grid, &region, false, &mut picture);
             let (found, whole, blank) = (bits(&picture), bits(&whole), bits(&blank(&grid)));
             for (pixel, found) in found.into_iter().enumerate() {
                 let (column, row) = (pixel as u32 % 97, pixel as u32 / 97);
@@ -103,7 +103,7 @@ fn objects_in_another_colour_leave_no_ghost_of_the_old() {
         let expected = render_window(&changed, &map, &grid, false);
         let of_object = |face| map.faces.object(face).index() == object;
         let region = Region::of_faces(&map, &grid, of_object);
-        render_region(&changed, &map, &grid, &region, false, &mut picture);
+        render_region(&changed, &map, &[], &grid, &region, false, &mut picture);
         assert!(
             bits(&picture) == bits(&expected),
             "{}",
@@ -128,7 +128,7 @@ fn an_object_that_moved_leaves_no_ghost_where_it_was() {
     let region = was.clone().or(&is);
     assert!(region.count() > was.count() && was.clone().and(&is).count() < was.count());
     let mut picture = render_window(&before, &map_before, &grid, false);
-    render_region(&after, &map_after, &grid, &region, false, &mut picture);
+    render_region(&after, &map_after, &[], &grid, &region, false, &mut picture);
     let expected = render_window(&after, &map_after, &grid, false);
     let pairs = picture
         .pixels

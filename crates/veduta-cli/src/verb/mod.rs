@@ -7,6 +7,7 @@ mod deep;
 pub mod diff;
 pub mod examples;
 pub mod frames;
+mod guests;
 pub mod info;
 mod look;
 pub mod man;
@@ -24,7 +25,7 @@ use clap::{Args, ValueEnum};
 use output::Output;
 use std::path::Path;
 use veduta::pipeline::Shortcoming;
-use veduta::scene::Scene;
+use veduta::scene::{Scene, Shown};
 use veduta_io::{
     Layers, LevelOfDetail, Loaded, Moment, PictureFormat, ReadOptions, UpAxis, closest_name,
     read_scene,
@@ -169,20 +170,36 @@ fn tell_shortcomings(
     talk: &mut Talk,
 ) -> Result<(), Failure> {
     let file = file.display();
-    for shortcoming in shortcomings {
-        let message = match shortcoming {
-            Shortcoming::DrawnOpaque(material) => {
-                let name = &scene.material(*material).name;
-                format!(
-                    "{file}: the material {name:?} is not opaque any more, but drawn so: what is \
-                     behind is not in the map; make the map of a scene with that material"
-                )
-            }
-            Shortcoming::VeilsLeftOut(count) => {
-                format!("{file}: {count} pieces of surfaces that are not opaque are left out")
-            }
-            other => format!("{file}: not shown as it should be: {other:?}"),
-        };
+    let mut messages = Vec::new();
+    for layer in &scene.layers {
+        let name = &layer.name;
+        messages.extend(match layer.shown {
+            Shown::CasterOnly => Some(format!(
+                "{file}: the layer {name:?} only casts shadows, and there are none yet: it gives nothing"
+            )),
+            Shown::ShadowOnly => Some(format!(
+                "{file}: the layer {name:?} only catches shadows, and there are none yet: it hides what \
+                 is behind it and gives nothing"
+            )),
+            _ => None,
+        });
+    }
+    // A layer whose objects differ in it stands there several times.
+    messages.dedup();
+    messages.extend(shortcomings.iter().map(|shortcoming| match shortcoming {
+        Shortcoming::DrawnOpaque(material) => {
+            let name = &scene.material(*material).name;
+            format!(
+                "{file}: the material {name:?} is not opaque any more, but drawn so: what is \
+                 behind is not in the map; make the map of a scene with that material"
+            )
+        }
+        Shortcoming::VeilsLeftOut(count) => {
+            format!("{file}: {count} pieces of surfaces that are not opaque are left out")
+        }
+        other => format!("{file}: not shown as it should be: {other:?}"),
+    }));
+    for message in messages {
         if strict {
             let message = format!("{message} (an error because of --strict)");
             return Err(Failure::new(Code::Unsupported, message));

@@ -139,6 +139,7 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        self.look.refuse_background_map()?;
         if let Some(target) = self.output.vector_target(&self.model, json)? {
             self.refuse_self_contained()?;
             return self.draw(&target, json, talk);

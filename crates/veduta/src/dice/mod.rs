@@ -15,6 +15,8 @@
 //! 3. Where veils (faces that are not fully opaque) are seen, [`attenuate`] makes of each part's area what
 //!    is left of it behind the veils before it, once their opacities are known.
 //!
+//! [`GuestDicer`] does that where pictures of other programs are seen too, whose samples have depths.
+//!
 //! For filters that reach beyond a pixel the same is done on cells around it, with all moments of parts instead
 //! of areas ([`CellParts`], [`PixelGrid::between_centres`]).
 //!
@@ -25,17 +27,20 @@
 mod bands;
 mod coverage;
 mod depth;
+mod guests;
 mod measure;
 mod pixel_grid;
 mod place;
 mod region;
 mod shares;
 mod spans;
+mod tidy;
 mod veils;
 
 pub use bands::{BAND_ROWS, Bands};
 pub use coverage::{Coverage, coverage};
 pub use depth::{DepthRange, Depths, depth_of_nearness};
+pub use guests::{GuestBuffers, GuestDicer, GuestLight};
 pub use measure::{CellParts, Diced, Measure};
 pub use pixel_grid::PixelGrid;
 pub use region::Region;

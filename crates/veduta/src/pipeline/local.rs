@@ -4,18 +4,21 @@
 //! Areas are exact here, so each pixel is made whole, of all that it shows: nothing of what was there
 //! before is left at its edges.
 
-use super::{BandBuffers, material_of};
+use super::guests::GuestLayers;
+use super::mattes::without_mattes;
+use super::{BandBuffers, Blended, material_of};
 use crate::accumulate::Picture;
 use crate::dice::{self, BAND_ROWS, Bands, PixelGrid, Region};
 use crate::scene::Scene;
 use crate::shade::light::Daylight;
 use crate::shade::{Surfaces, Textures};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
-use veduta_map::{FaceId, MaterialId, VisibilityMap};
+use veduta_map::{FaceId, Guest, MaterialId, VisibilityMap};
 
-/// Makes the pixels of `region` again in a picture of a map of `scene` on `grid`. They are, to the bit,
-/// those that [`render_window`](super::render_window) makes, and what they cost goes with their number; the
+/// Makes the pixels of `region` again in a picture of a map of `scene` with `guests` on `grid`. They are, to
+/// the bit, those that [`render_seen`](super::render_seen) makes, and what they cost goes with their number; the
 /// others are not touched.
 ///
 /// # Panics
@@ -23,6 +26,7 @@ use veduta_map::{FaceId, MaterialId, VisibilityMap};
 pub fn render_region(
     scene: &Scene,
     map: &VisibilityMap,
+    guests: &[Guest],
     grid: &PixelGrid,
     region: &Region,
     unlit: bool,
@@ -37,6 +41,13 @@ pub fn render_region(
     let Some(bounds) = region.bounds() else {
         return;
     };
+    let guests = (!guests.is_empty()).then(|| GuestLayers::new(scene, map, guests, grid));
+    // Mattes hide guests too, and are left out after that.
+    let map = match guests {
+        Some(_) => Cow::Borrowed(map),
+        None => without_mattes(scene, map),
+    };
+    let map = &*map;
     let bands = Bands::within(map, *grid, bounds);
     let touched = (0..bands.len()).flat_map(|band| bands.fragments(band));
     let faces: BTreeSet<FaceId> = touched
@@ -51,7 +62,10 @@ pub fn render_region(
     let (camera, light) = (&map.camera, Daylight::default());
     let surfaces = Surfaces::new(scene, &textures, camera, &map.faces, &shown, light, unlit);
 
-    let veiled = (!map.veils.is_empty()).then_some(map);
+    let blended = Blended {
+        veiled: (!map.veils.is_empty()).then_some(map),
+        guests: guests.as_ref(),
+    };
     let band_pixels = grid.width as usize * BAND_ROWS as usize;
     let pixels = picture.pixels.par_chunks_mut(band_pixels);
     let is_made = region.pixels().par_chunks(band_pixels);
@@ -65,8 +79,11 @@ pub fn render_region(
             dice::dice(map, &bands, band, |k| surfaces.varies(k), dicer, parts);
             let first_row = bands.rows(band).start;
             region.clip(parts, first_row);
+            if let Some(guests) = &guests {
+                guests.touch(bands.rows(band), &mut buffers.guests, parts);
+            }
             made.resize(pixels.len(), [0.0; 4]);
-            buffers.finish(&surfaces, veiled, grid, first_row, made);
+            buffers.finish(&surfaces, blended, grid, first_row, made);
             let rows = pixels.iter_mut().zip(&*made).zip(is_made);
             for ((pixel, made), _) in rows.filter(|row| *row.1) {
                 *pixel = *made;

@@ -6,6 +6,7 @@ mod model;
 mod pick;
 mod tree;
 
+use super::guests::kind_name;
 use super::render::View;
 use super::stored::Stored;
 use super::{When, is_picture, load};
@@ -174,6 +175,19 @@ fn map_told<R: Read + Seek>(seen: &Stored, file: &MapReader<R>, all: bool) -> (V
     told["camera"] = model::camera_as_json("", seen.camera());
     told["sources"] = json!(sources);
     told["generator"] = file.generator().into();
+    if let Stored::Regions(seen) = seen {
+        told["hasHoles"] = seen.has_holes.into();
+        let guests = seen.guests.iter().map(|guest| {
+            let samples = guest.samples().len();
+            json!({
+                "name": guest.name(),
+                "kind": guest.kind(),
+                "size": guest.grid().size,
+                "samples": samples,
+            })
+        });
+        told["guests"] = guests.collect();
+    }
     let again: Vec<&str> = file
         .readings()
         .iter()
@@ -191,6 +205,15 @@ fn map_told<R: Read + Seek>(seen: &Stored, file: &MapReader<R>, all: bool) -> (V
     );
     for source in sources {
         text += &format!("  made of   {}\n", plain(source));
+    }
+    if let Stored::Regions(seen) = seen {
+        for guest in &seen.guests {
+            let (name, [width, height]) = (plain(guest.name()), guest.grid().size);
+            let (kind, samples) = (kind_name(guest.kind()), guest.samples().len());
+            text += &format!(
+                "  guest     {name}: {kind}, {width} x {height} pixels, {samples} samples\n"
+            );
+        }
     }
     let mut casters: Vec<String> = Vec::new();
     if file.has_embedded_casters() {

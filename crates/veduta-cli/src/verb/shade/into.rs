@@ -279,7 +279,8 @@ fn blend(
         pixels: vec![[0.0; 4]; grid.pixel_count()],
         ..*picture
     };
-    pipeline::render_region(&seen.scene, &seen.map, grid, region, unlit, &mut made);
+    let (scene, map, guests) = (&seen.scene, &seen.map, &seen.guests);
+    pipeline::render_region(scene, map, guests, grid, region, unlit, &mut made);
     development.develop(&mut made, !target.linear);
     let rows = picture
         .pixels

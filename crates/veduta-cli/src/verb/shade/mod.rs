@@ -4,7 +4,7 @@ mod into;
 
 use super::look::Look;
 use super::output::{Output, Target};
-use super::stored::{Changes, Stored, open, tell_work};
+use super::stored::{Changes, Stored, Trust, laid_on, open, refuse_filter_of_guests, tell_work};
 use super::vector::{Subject, Vector};
 use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
@@ -53,6 +53,8 @@ pub struct Shade {
     #[command(flatten)]
     local: Into,
     #[command(flatten)]
+    trust: Trust,
+    #[command(flatten)]
     changes: Changes,
     #[command(flatten)]
     output: Output,
@@ -73,6 +75,10 @@ Examples:
   Some objects anew, in a picture that is there:
       veduta shade town.veduta -o a.exr
       veduta shade town.veduta --unlit --into a.exr --objects wall -o b.exr
+  Before what another map shows, however near that is:
+      veduta render hut.obj --eye 9,-9,5 --look-at 0,0,0 -o far.veduta
+      veduta render town.obj --eye 9,-9,5 --look-at 0,0,0 -o near.veduta
+      veduta shade near.veduta --background far.veduta -o before.png
   For deep compositing, all that is seen in each pixel:
       veduta shade town.veduta -o town-deep.exr --deep
   With what was red in another colour:
@@ -154,7 +160,20 @@ impl Shade {
             [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels))
         };
         let mut seen = match map.reader().sub_scanlines_per_row() {
-            None => Stored::Regions(map.read(|reader| reader.read_window(window(&reached)))?),
+            None => {
+                let seen = map.read(|reader| reader.read_window(window(&reached)))?;
+                let seen = laid_on(seen, &self.look, self.trust, |reader| {
+                    reader.read_window(window(&reached))
+                })?;
+                if !seen.guests.is_empty() && (vector.is_some() || self.deep) {
+                    let message = format!(
+                        "{}: holds pictures of other programs, which are laid into flat pixels only",
+                        self.map.display()
+                    );
+                    return Err(Failure::new(Code::Unsupported, message));
+                }
+                Stored::Regions(seen)
+            }
             Some(_) if vector.is_some() || self.deep => {
                 let message = format!(
                     "{}: holds spans on sub-scanlines; vector and deep pictures are made of regions, \
@@ -163,7 +182,11 @@ impl Shade {
                 );
                 return Err(Failure::new(Code::Usage, message));
             }
-            Some(_) => Stored::read(&mut map)?,
+            Some(_) => {
+                let why = "spans on sub-scanlines have no regions before a map as background";
+                self.look.refuse_background_map_of(why)?;
+                Stored::read(&mut map)?
+            }
         };
         let bytes_read = map.reader().bytes_read();
         self.changes.apply(seen.scene_mut(), self.strict, talk)?;
@@ -241,6 +264,7 @@ impl Shade {
             self.look
                 .refuse_filter("filters weigh exact regions, not spans")?;
         }
+        refuse_filter_of_guests(&self.map, seen, &self.look)?;
         let (aovs, filter) = (self.output.aovs(), self.look.filter());
         let picture = seen.picture(grid, self.look.unlit, filter, aovs);
         let (mut picture, aovs) = picture.map_err(|error| {

@@ -10,6 +10,7 @@ use super::value::{
 use crate::read::error::Problem;
 use serde_json::{Value, json};
 use toml::de::DeValue;
+use veduta::scene::Shown;
 
 table! {
     /// A scene of Veduta: models in layers, cameras, and changes to materials.
@@ -134,6 +135,10 @@ table! {
         optional repeat: Flag,
         /// Of faces in one plane those of the layer with the higher priority are seen; 0 by default.
         optional priority: Priority,
+        /// Whether it is seen. A matte hides what is behind it and gives nothing itself: the picture has
+        /// a hole of its shape. What is caster-only hides nothing and will cast shadows, what is
+        /// shadow-only is a matte that will catch them, once there are any.
+        optional shown: Shown,
         /// A table (CSV) of places at which the model stands: a header with the columns x, y, z and
         /// any of heading, pitch, roll, scale, name; metres and degrees. heading turns clockwise seen
         /// from above; pitch lifts the model's +y, roll lowers its +x. at comes before.

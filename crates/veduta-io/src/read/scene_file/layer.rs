@@ -16,13 +16,14 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use veduta::geometry::{DMat4, DVec3};
 use veduta::map::{Camera, MaterialId, Projection};
-use veduta::scene::{ImageId, Light, MeshId, Object, Scene};
+use veduta::scene::{ImageId, Layer, Light, MeshId, Object, Scene, Shown};
 
 /// A layer whose files are there.
 #[derive(Debug)]
 pub struct PlannedLayer<'d> {
     pub name: &'d str,
     pub priority: i32,
+    shown: Shown,
     model: PathBuf,
     pub model_span: Span,
     options: ReadOptions,
@@ -43,6 +44,16 @@ pub struct Part {
 }
 
 impl PlannedLayer<'_> {
+    /// The layer, without objects, before object `next` of a scene.
+    fn row(&self, next: u32, shown: Shown) -> Layer {
+        Layer {
+            name: self.name.to_owned(),
+            priority: self.priority,
+            shown,
+            objects: next..next,
+        }
+    }
+
     /// Whether its places come from a table.
     pub fn has_instances(&self) -> bool {
         self.instances.is_some()
@@ -131,6 +142,10 @@ pub fn plan<'d>(
                     .priority
                     .as_ref()
                     .map_or(0, |priority| priority.value.0),
+                shown: layer
+                    .shown
+                    .as_ref()
+                    .map_or(Shown::Seen, |shown| shown.value),
                 model,
                 model_span,
                 options: ReadOptions {
@@ -220,7 +235,7 @@ pub fn read(
     Ok(parts)
 }
 
-/// Adds a part to the scene, all its names under that of the layer; the sizes of pictures that its
+/// Adds a part to the scene as a layer, all its names under that of the layer; the sizes of pictures that its
 /// cameras ask for.
 pub fn append(
     scene: &mut Scene,
@@ -238,9 +253,23 @@ pub fn append(
         images,
         cameras,
         lights,
-        layers: _,
+        layers,
         world: _,
     } = part.loaded.scene;
+    // What is not simply seen in a scene file stays so where that is a layer of another.
+    let shown_of = |object: usize| {
+        let of = layers
+            .iter()
+            .find(|of| of.objects.contains(&(object as u32)));
+        let own = of.map_or(Shown::Seen, |of| of.shown);
+        if layer.shown.is_seen() {
+            own
+        } else {
+            layer.shown
+        }
+    };
+    let next = scene.objects.len() as u32;
+    scene.layers.push(layer.row(next, layer.shown));
     let first_mesh = scene.meshes.len();
     let first_image = scene.images.len() as u32;
     let first_material = scene.materials.len();
@@ -276,9 +305,10 @@ pub fn append(
             None => layer.name.to_owned(),
             Some(instance) => format!("{}/{instance}", layer.name),
         };
-        for object in &objects {
+        for (index, object) in objects.iter().enumerate() {
             let name = prefixed(&prefix, &object.name);
             charge(size_of::<Object>() + name.len())?;
+            add_to_layer(scene, layer, shown_of(index));
             scene.objects.push(Object {
                 name,
                 mesh: MeshId((first_mesh + object.mesh.0 as usize) as u32),
@@ -324,6 +354,25 @@ pub fn append(
     let is_known = |(name, _): &(String, [u32; 2])| scene.cameras.iter().any(|(of, _)| of == name);
     sizes.retain(is_known);
     Ok(sizes)
+}
+
+/// Says that the next object of the scene is of `layer`, the last one. A layer of which not all objects are
+/// shown alike has several rows.
+fn add_to_layer(scene: &mut Scene, layer: &PlannedLayer<'_>, shown: Shown) {
+    let next = scene.objects.len() as u32;
+    match scene.layers.last_mut() {
+        Some(last) if last.shown == shown || last.objects.is_empty() => {
+            last.shown = shown;
+            last.objects.end = next + 1;
+        }
+        _ => {
+            let row = layer.row(next, shown);
+            scene.layers.push(Layer {
+                objects: next..next + 1,
+                ..row
+            });
+        }
+    }
 }
 
 /// A name under another; what has none is called as what it is of.

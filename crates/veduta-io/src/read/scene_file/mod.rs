@@ -36,7 +36,7 @@ use serde_json::{Value, json};
 use source::{Faults, Source};
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
-use veduta::scene::{Layer, Scene};
+use veduta::scene::Scene;
 
 /// Whether a file is a scene file, by its name.
 pub(crate) fn is_scene_file(path: &Path) -> bool {
@@ -129,15 +129,9 @@ fn read_included(
         .collect();
     let default_camera = cameras.first().map(|camera| camera.name.clone());
     for (layer, part) in layers.iter().zip(parts) {
-        let first = scene.objects.len() as u32;
         animations.extend(layer.animations(&part.loaded));
         let sizes = layer::append(&mut scene, layer, part, &source, inclusion, &mut warnings)?;
         picture_sizes.extend(sizes);
-        scene.layers.push(Layer {
-            name: layer.name.to_owned(),
-            priority: layer.priority,
-            objects: first..scene.objects.len() as u32,
-        });
     }
     material::change(&mut scene, &globs, &source, inclusion, &mut warnings)?;
     camera::set_near_planes(&mut scene, &cameras);

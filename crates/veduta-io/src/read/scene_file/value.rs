@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 use toml::de::DeValue;
 use veduta::geometry::{DMat4, DVec2, DVec3, DVec4, Vec2};
+use veduta::scene::Shown;
 
 /// A number. TOML also has infinities and what is no number at all; those are refused.
 fn number(value: &DeValue<'_>) -> Option<f64> {
@@ -444,6 +445,24 @@ impl Leaf for Up {
 
     fn schema() -> Value {
         json!({ "enum": ["y", "z"] })
+    }
+}
+
+impl Leaf for Shown {
+    const EXPECTED: &'static str = "\"seen\", \"matte\", \"caster-only\" or \"shadow-only\"";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        match value.as_str()? {
+            "seen" => Some(Ok(Self::Seen)),
+            "matte" => Some(Ok(Self::Matte)),
+            "caster-only" => Some(Ok(Self::CasterOnly)),
+            "shadow-only" => Some(Ok(Self::ShadowOnly)),
+            _ => None,
+        }
+    }
+
+    fn schema() -> Value {
+        json!({ "enum": ["seen", "matte", "caster-only", "shadow-only"] })
     }
 }
 
