@@ -56,7 +56,7 @@ fn windows_made_again_are_the_whole_picture_there_and_nothing_elsewhere() {
             (0..97, 0..71),
             (96..200, 70..300),
             (50..51, 16..17),
-            (30..20, 0..71),
+            (30..30, 0..71),
         ];
         for (columns, rows) in windows {
             let region = Region::window(&grid, columns.clone(), rows.clone());

@@ -240,7 +240,7 @@ fn parts_that_cannot_be_are_refused() {
     let window = "--window 0,0,4,4";
     for (arguments, code, message) in [
         (
-            format!("--into old.exr -o new.exr"),
+            "--into old.exr -o new.exr".to_owned(),
             2,
             "--window, --objects or both",
         ),
@@ -275,17 +275,17 @@ fn parts_that_cannot_be_are_refused() {
             "leave --into out",
         ),
         (
-            format!("--into old.exr --window 0.5,0,4,4 -o new.exr"),
+            "--into old.exr --window 0.5,0,4,4 -o new.exr".to_owned(),
             2,
             "whole pixels",
         ),
         (
-            format!("--into old.exr --window 8,0,4,4 -o new.exr"),
+            "--into old.exr --window 8,0,4,4 -o new.exr".to_owned(),
             2,
             "outside",
         ),
         (
-            format!("--into old.exr --objects bix -o new.exr"),
+            "--into old.exr --objects bix -o new.exr".to_owned(),
             3,
             "\"box\"",
         ),
@@ -294,7 +294,7 @@ fn parts_that_cannot_be_are_refused() {
             6,
             "none.exr",
         ),
-        (format!("--objects box -o new.exr"), 2, "--into"),
+        ("--objects box -o new.exr".to_owned(), 2, "--into"),
     ] {
         let output = folder
             .veduta(&format!("shade town.veduta {arguments}"))

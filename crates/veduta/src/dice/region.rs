@@ -88,16 +88,18 @@ impl Region {
     /// The columns and rows around it; nothing, if it is empty.
     pub fn bounds(&self) -> Option<[Range<u32>; 2]> {
         let width = self.width as usize;
-        let (mut columns, mut rows) = (u32::MAX..0, u32::MAX..0);
-        for (row, pixels) in self.pixels.chunks_exact(width).enumerate() {
+        let mut bounds: Option<[Range<u32>; 2]> = None;
+        for (row, pixels) in (0..).zip(self.pixels.chunks_exact(width)) {
             let Some(first) = pixels.iter().position(|&is_in| is_in) else {
                 continue;
             };
             let last = pixels.iter().rposition(|&is_in| is_in).unwrap_or(first);
-            columns = columns.start.min(first as u32)..columns.end.max(last as u32 + 1);
-            rows = rows.start.min(row as u32)..row as u32 + 1;
+            let [first, end] = [first as u32, last as u32 + 1];
+            let [columns, rows] = bounds.get_or_insert([first..end, row..row]);
+            *columns = columns.start.min(first)..columns.end.max(end);
+            rows.end = row + 1;
         }
-        (!rows.is_empty()).then_some([columns, rows])
+        bounds
     }
 
     /// Leaves of the parts of a band those in the region. `first_row` is the band's first.
