@@ -12,7 +12,9 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 use veduta::accumulate::Picture;
 use veduta::geometry::{DMat4, DVec2, DVec3};
-use veduta::map::{Camera, FaceId, Fragment, MaterialId, Projection, SeenScene, VisibilityMap};
+use veduta::map::{
+    Camera, FaceId, Fragment, MaterialId, Origin, Projection, SeenScene, VisibilityMap,
+};
 use veduta::pipeline::{RenderSettings, find_visibility, render_map};
 use veduta::scene::{Material, Mesh, MeshId, Object, Scene, generate};
 use veduta_io::deep_exr::{
@@ -86,7 +88,7 @@ impl Pair {
             let seen = SeenScene::of(scene, &map, self.size);
             faces += seen.map.faces.len();
             let stored = folder.join(name).with_extension("veduta");
-            write_map(&stored, &seen, &[]).map_err(|error| error.to_string())?;
+            write_map(&stored, &seen, &Origin::default()).map_err(|error| error.to_string())?;
             let deep = folder.join(name).with_extension("exr");
             let written = write_deep(&deep, &seen, samples);
             deep_samples += written.map_err(|error| format!("{}: {error}", deep.display()))?;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use veduta::pipeline::Sampling;
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::PictureFormat;
 use veduta_io::tone::{Exposure, linear_from_srgb};
+use veduta_io::{PictureFormat, is_map};
 
 /// Size of a picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,6 +148,63 @@ pub fn length(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A time from 0 on, in seconds: `1.5s`, `200ms`, `2min`, or a number of seconds.
+pub fn time(text: &str) -> Result<f64, String> {
+    let units = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("", 1.0)];
+    let seconds = units.iter().find_map(|(unit, seconds)| {
+        let number = text.strip_suffix(unit)?.trim().parse::<f64>().ok()?;
+        Some(number * seconds)
+    });
+    match seconds {
+        // Beyond some months a double would lose the fractions.
+        Some(seconds) if (0.0..=1e7).contains(&seconds) => Ok(seconds),
+        _ => Err("expected a time from 0 on, such as 1.5s or 200ms".into()),
+    }
+}
+
+/// Some frames of an animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRange {
+    pub first: u32,
+    /// Not before the first; it is one of them if the steps lead to it.
+    pub last: u32,
+    /// At least 1.
+    pub step: u32,
+}
+
+impl FrameRange {
+    pub fn is_one(&self) -> bool {
+        self.first == self.last
+    }
+
+    pub fn count(&self) -> usize {
+        ((self.last - self.first) / self.step) as usize + 1
+    }
+
+    pub fn numbers(&self) -> impl Iterator<Item = u32> + use<> {
+        (self.first..=self.last).step_by(self.step as usize)
+    }
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (range, step) = match text.split_once('x') {
+            Some((range, step)) => (range, step.parse().ok()),
+            None => (text, Some(1)),
+        };
+        let (first, last) = range.split_once("..").unwrap_or((range, range));
+        match (first.parse(), last.parse(), step) {
+            (Ok(first), Ok(last), Some(1..)) if first > last => {
+                Err(format!("frame {last} comes before frame {first}"))
+            }
+            (Ok(first), Ok(last), Some(step @ 1..)) => Ok(Self { first, last, step }),
+            _ => Err("expected frames such as 0..47, 0..47x2 or 12".into()),
+        }
+    }
+}
+
 /// Background of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Background {
@@ -157,15 +214,20 @@ pub enum Background {
     Color([f32; 3]),
     /// The picture in this file.
     Picture(PathBuf),
+    /// The stored map in this file.
+    Map(PathBuf),
 }
 
 impl FromStr for Background {
     type Err = String;
 
-    /// `none`, `#rgb` or `#rrggbb` (sRGB), or a file with the suffix of a picture.
+    /// `none`, `#rgb` or `#rrggbb` (sRGB), or a file with the suffix of a picture or a stored map.
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "none" {
             return Ok(Self::None);
+        }
+        if is_map(Path::new(text)) {
+            return Ok(Self::Map(PathBuf::from(text)));
         }
         if PictureFormat::of(Path::new(text)).is_ok() {
             return Ok(Self::Picture(PathBuf::from(text)));
@@ -342,6 +404,26 @@ mod tests {
         assert_eq!(crease_angle("180deg"), Ok(std::f64::consts::PI));
         for text in ["-1deg", "181", "nan", "4rad", ""] {
             assert!(crease_angle(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn times_have_units_and_frames_both_ends() {
+        for text in ["1.5s", "1.5", "1500 ms", "0.025min"] {
+            assert!((time(text).expect(text) - 1.5).abs() < 1e-12, "{text}");
+        }
+        for text in ["-1s", "nan", "1h", "s", "", "1e9"] {
+            assert!(time(text).is_err(), "{text}");
+        }
+        let numbers = |text: &str| {
+            text.parse()
+                .map(|f: FrameRange| f.numbers().collect::<Vec<_>>())
+        };
+        assert_eq!(numbers("3..5"), Ok(vec![3, 4, 5]));
+        assert_eq!(numbers("3..8x2"), Ok(vec![3, 5, 7]));
+        assert_eq!(numbers("12"), Ok(vec![12]));
+        for text in ["5..3", "1..", "..2", "1..2x0", "1..2x", "-1..2", "a", ""] {
+            assert!(text.parse::<FrameRange>().is_err(), "{text}");
         }
     }
 

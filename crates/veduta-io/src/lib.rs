@@ -20,6 +20,8 @@ mod casters;
 pub mod deep_exr;
 #[cfg(feature = "exr")]
 pub mod depth_picture;
+#[cfg(feature = "exr")]
+mod guest;
 mod map_file;
 mod object_names;
 #[cfg(any(
@@ -49,6 +51,8 @@ pub use casters::{
     CastersError, SourceError, SourceProblem, check_source, choose_objects, read_casters,
     reading_of,
 };
+#[cfg(feature = "exr")]
+pub use guest::{GuestOptions, GuestProblem, LoadedGuest, read_guest};
 pub use map_file::{MAP_SUFFIX, MapFileError, OpenMap, is_map, open_map, write_map, write_spans};
 pub use object_names::ObjectNames;
 #[cfg(any(
@@ -60,8 +64,8 @@ pub use object_names::ObjectNames;
     feature = "toml"
 ))]
 pub use read::{
-    Detail, ErrorKind, Excerpt, Loaded, Place, Problem, ReadError, ReadOptions, SCENE_SUFFIXES,
-    UpAxis, Warning, read_scene,
+    Animation, AnimationKind, Detail, ErrorKind, Excerpt, Loaded, Moment, Place, Problem,
+    ReadError, ReadOptions, SCENE_SUFFIXES, SceneOverTime, UpAxis, Warning, read_scene,
 };
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};

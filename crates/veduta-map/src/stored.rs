@@ -1,6 +1,7 @@
 use crate::scene::{ImageId, Layer, Material, Mesh, MeshId, Object, Scene, TextureRef};
 use crate::{
-    FaceId, Faces, Fragment, Fragments, MaterialId, ObjectId, PlaneId, Side, VisibilityMap,
+    Camera, FaceId, Faces, Fragment, Fragments, Guest, MaterialId, ObjectId, PlaneId, Side,
+    VisibilityMap,
 };
 use std::collections::BTreeSet;
 
@@ -22,6 +23,11 @@ pub struct SeenScene {
     /// Width and height in pixels of the picture it was made for. A map has no resolution; this is what
     /// users expect who do not ask for another size.
     pub size: [u32; 2],
+    /// Whether something was cut out of the map or left out of it. Without holes, where a face is unseen
+    /// something nearer hides it; with them, only the fragments tell where a face is.
+    pub has_holes: bool,
+    /// Pictures of other programs that are seen with it, ordered by depth when pixels are made.
+    pub guests: Vec<Guest>,
 }
 
 /// The mesh of an object, wherever it is kept.
@@ -34,7 +40,23 @@ pub struct ObjectMesh<'a> {
 }
 
 impl SeenScene {
-    /// What `map` shows of `scene`, in normal form.
+    /// Nothing, seen through `camera`: what guests of no map are in.
+    pub fn of_nothing(camera: Camera, size: [u32; 2]) -> Self {
+        Self {
+            map: VisibilityMap {
+                camera,
+                faces: Faces::new(),
+                opaque: Fragments::new(),
+                veils: Fragments::new(),
+            },
+            scene: Scene::default(),
+            size,
+            has_holes: false,
+            guests: Vec::new(),
+        }
+    }
+
+    /// What `map`, which has no holes, shows of `scene`, in normal form. There are no guests.
     ///
     /// # Panics
     /// If `map` is not a map of `scene`.
@@ -76,6 +98,8 @@ impl SeenScene {
             },
             scene: seen.into_scene(scene),
             size,
+            has_holes: false,
+            guests: Vec::new(),
         }
     }
 }
@@ -97,7 +121,7 @@ fn faces_named(map: &VisibilityMap) -> Vec<FaceId> {
 
 impl SeenScene {
     /// What is seen of the objects that `wanted` accepts by their names. Where others were seen nothing
-    /// is: what they hide is not known.
+    /// is: what they hide is not known. Guests stay.
     pub fn selected(&self, wanted: impl Fn(&str) -> bool) -> Self {
         let is_wanted: Vec<bool> = self.scene.objects.iter().map(|o| wanted(&o.name)).collect();
         let faces = &self.map.faces;
@@ -107,7 +131,11 @@ impl SeenScene {
             veils: self.map.veils.selected(keep),
             ..self.map.clone()
         };
-        Self::of(&self.scene, &map, self.size)
+        Self {
+            has_holes: self.has_holes || is_wanted.contains(&false),
+            guests: self.guests.clone(),
+            ..Self::of(&self.scene, &map, self.size)
+        }
     }
 }
 
@@ -115,17 +143,36 @@ impl Fragments {
     /// The fragments of the faces that `wanted` accepts.
     pub fn selected(&self, wanted: impl Fn(FaceId) -> bool) -> Self {
         let mut selected = Self::new();
-        for fragment in self.iter().filter(|fragment| wanted(fragment.face())) {
-            match fragment {
-                Fragment::Whole(face) => selected.push_whole(face),
-                Fragment::Cut {
-                    face,
-                    vertices,
-                    sides,
-                } => selected.push_cut(face, vertices.iter().copied().zip(sides.iter().copied())),
-            }
-        }
+        let wanted = self.iter().filter(|fragment| wanted(fragment.face()));
+        wanted.for_each(|fragment| selected.push(fragment));
         selected
+    }
+
+    /// These fragments and others, of other faces.
+    pub fn with(&self, other: &Self) -> Self {
+        let mut order: Vec<(FaceId, &Self, usize)> = Vec::with_capacity(self.len() + other.len());
+        for of in [self, other] {
+            order.extend((0..of.len()).map(|index| (of.face(index), of, index)));
+        }
+        // Stable: the fragments of a face stay in order.
+        order.sort_by_key(|row| row.0);
+        let mut both = Self::new();
+        for (_, of, index) in order {
+            both.push(of.get(index));
+        }
+        both
+    }
+
+    /// Adds a fragment of a face that is not before the last one's.
+    fn push(&mut self, fragment: Fragment) {
+        match fragment {
+            Fragment::Whole(face) => self.push_whole(face),
+            Fragment::Cut {
+                face,
+                vertices,
+                sides,
+            } => self.push_cut(face, vertices.iter().copied().zip(sides.iter().copied())),
+        }
     }
 
     /// The same fragments of faces with other numbers, in their order.

@@ -1,15 +1,25 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
-//! the light, `pipeline/deep.rs` for deep pictures and `pipeline/filtered.rs` for filters that reach beyond
-//! the pixel.
+//! the light, `pipeline/deep.rs` for deep pictures, `pipeline/filtered.rs` for filters that reach beyond
+//! the pixel, `pipeline/frames.rs` for animations, `pipeline/local.rs` for parts of pictures, and
+//! `pipeline/guests.rs` and `pipeline/mattes.rs` for what is only in composites.
 
 mod aovs;
 mod deep;
 mod filtered;
+mod frames;
+mod guests;
+mod local;
+mod mattes;
 
 pub use deep::{deep_window, render_deep};
+pub use frames::{Extent, FrameStep, FrameWork, Frames};
+pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
-use crate::dice::{self, BAND_ROWS, Bands, Dicer, Parts, PixelGrid, SpanDicer, VeilBuffers};
+use crate::dice::{
+    self, BAND_ROWS, Bands, Dicer, GuestBuffers, GuestLight, Parts, PixelGrid, SpanDicer,
+    VeilBuffers,
+};
 use crate::drawing::{self, Drawing, Evenness, Look};
 use crate::filter::Filter;
 use crate::scene::{Opacities, Opacity, Scene};
@@ -18,11 +28,15 @@ use crate::shade::{Radiance, Surfaces, Textures};
 use crate::visibility::multiscan;
 use crate::visibility::{self, Seen, Strips, speculative};
 use aovs::{AovBuffers, AovMaker};
+use guests::GuestLayers;
+use mattes::without_mattes;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Mutex;
 use veduta_map::{
-    Camera, FaceId, Faces, MaterialId, SeenSpans, Spans, TooFewSubScanlines, VisibilityMap,
+    Camera, FaceId, Faces, Guest, MaterialId, SeenScene, SeenSpans, Spans, TooFewSubScanlines,
+    VisibilityMap,
 };
 
 /// How a picture is made.
@@ -222,9 +236,44 @@ pub fn render_channels(
     filter: Filter,
     aovs: AovSettings,
 ) -> (Picture, Aovs) {
+    render_with_guests(scene, map, &[], grid, unlit, filter, aovs)
+}
+
+/// [`render_channels`] of a stored map with its guests. Channels beside the light are of the map alone, as
+/// far as guests do not hide it.
+///
+/// # Panics
+/// If the picture is too large for the machine's memory, or guests are to be seen by another filter than the
+/// box: they are laid into pixels.
+pub fn render_seen(
+    seen: &SeenScene,
+    grid: &PixelGrid,
+    unlit: bool,
+    filter: Filter,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
+    let SeenScene {
+        scene, map, guests, ..
+    } = seen;
+    assert!(
+        filter == Filter::Box || guests.is_empty(),
+        "guests are laid into pixels by area"
+    );
+    render_with_guests(scene, map, guests, grid, unlit, filter, aovs)
+}
+
+fn render_with_guests(
+    scene: &Scene,
+    map: &VisibilityMap,
+    guests: &[Guest],
+    grid: &PixelGrid,
+    unlit: bool,
+    filter: Filter,
+    aovs: AovSettings,
+) -> (Picture, Aovs) {
     let textures = Textures::new(scene, &materials_seen(scene, map));
     let mut canvas = Canvas::new(grid, filter, aovs);
-    canvas.paint_map(scene, &textures, map, grid, unlit, 0);
+    canvas.paint_map(scene, &textures, map, guests, grid, unlit, 0);
     (canvas.picture, canvas.aovs)
 }
 
@@ -252,15 +301,27 @@ impl Canvas {
     }
 
     /// Makes the pixels of `grid`, which are those of the picture from row `first_row` on.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "one caller with and one without guests"
+    )]
     fn paint_map(
         &mut self,
         scene: &Scene,
         textures: &Textures,
         map: &VisibilityMap,
+        guests: &[Guest],
         grid: &PixelGrid,
         unlit: bool,
         first_row: usize,
     ) {
+        let guests = (!guests.is_empty()).then(|| GuestLayers::new(scene, map, guests, grid));
+        // Mattes hide guests too, and are left out after that.
+        let map = match guests {
+            Some(_) => Cow::Borrowed(map),
+            None => without_mattes(scene, map),
+        };
+        let map = &*map;
         let shown = map.shown_faces();
         let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
         let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);
@@ -273,12 +334,18 @@ impl Canvas {
         let dice = |band: usize, buffers: &mut BandBuffers| {
             let BandBuffers { dicer, parts, .. } = buffers;
             dice::dice(map, &bands, band, varies, dicer, parts);
+            if let Some(guests) = &guests {
+                guests.touch(bands.rows(band), &mut buffers.guests, parts);
+            }
         };
         let kernel = self.filter.kernel();
         // Channels are those of pixels, and made with the light by area, which a kernel's replaces.
         if kernel.is_none() || maker.is_some() {
-            let veiled = (!map.veils.is_empty()).then_some(map);
-            self.paint(&surfaces, maker.as_ref(), veiled, grid, first_row, dice);
+            let blended = Blended {
+                veiled: (!map.veils.is_empty()).then_some(map),
+                guests: guests.as_ref(),
+            };
+            self.paint(&surfaces, maker.as_ref(), blended, grid, first_row, dice);
         }
         if let Some(kernel) = &kernel {
             let first = first_row * grid.width as usize;
@@ -304,13 +371,12 @@ impl Canvas {
             .then(|| AovMaker::new(scene, textures, camera, faces, shown, settings))
     }
 
-    /// Makes the bands of `grid` from their parts, which `dice` finds; of the map `veiled` if there are
-    /// veils among them.
+    /// Makes the bands of `grid` from their parts, which `dice` finds, and what is blended with them.
     fn paint(
         &mut self,
         surfaces: &Surfaces,
         maker: Option<&AovMaker>,
-        veiled: Option<&VisibilityMap>,
+        blended: Blended,
         grid: &PixelGrid,
         first_row: usize,
         dice: impl Fn(usize, &mut BandBuffers) + Sync,
@@ -325,7 +391,7 @@ impl Canvas {
             |buffers, (band, light)| {
                 dice(band, buffers);
                 let row = band as u32 * BAND_ROWS;
-                buffers.finish(surfaces, veiled, grid, row, light);
+                buffers.finish(surfaces, blended, grid, row, light);
                 if let Some(maker) = maker {
                     let (parts, aov_buffers) = (&buffers.parts, &mut buffers.aovs);
                     let part = maker.make(parts, grid, row, light.len(), aov_buffers);
@@ -349,21 +415,22 @@ pub fn draw_window(
     unlit: bool,
     settings: &drawing::Settings,
 ) -> Drawing {
+    let map = &*without_mattes(scene, map);
     let looks = looks(scene, map, grid, unlit);
     drawing::draw(scene, map, &looks, grid, settings)
 }
 
-/// What each opaque fragment looks like; the same for all of a face.
+/// What each fragment looks like; the same for all of a face.
 fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> Vec<Look> {
     let textures = Textures::new(scene, &materials_seen(scene, map));
     let shown = map.shown_faces();
     let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
     let surfaces = Surfaces::new(scene, &textures, camera, faces, &shown, light, unlit);
-    // Of each fragment that is not even: the sum of area times radiance, and of area.
-    let mut sums = vec![[0.0; 4]; shown.len()];
+    // Of each fragment that is not even.
+    let mut sums = vec![LookSum::default(); shown.len()];
     if (0..shown.len() as u32).any(|fragment| surfaces.varies(fragment)) {
         let bands = Bands::new(map, *grid);
-        let of_bands: Vec<Vec<(u32, [f64; 4])>> = (0..bands.len())
+        let of_bands: Vec<Vec<(u32, LookSum)>> = (0..bands.len())
             .into_par_iter()
             .map_init(BandBuffers::default, |buffers, band| {
                 buffers.fragment_sums(&surfaces, map, &bands, band)
@@ -371,33 +438,37 @@ fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> V
             .collect();
         // In the order of bands, whichever was ready first.
         for (fragment, sum) in of_bands.into_iter().flatten() {
-            add(&mut sums[fragment as usize], sum);
+            sums[fragment as usize].add(&sum);
         }
     }
     let mut looks = Vec::with_capacity(shown.len());
-    for fragments in shown[..map.opaque.len()].chunk_by(|a, b| a == b) {
+    for fragments in shown.chunk_by(|a, b| a == b) {
         let first = looks.len();
-        let mut sum = [0.0; 4];
+        let mut sum = LookSum::default();
         for of_fragment in &sums[first..first + fragments.len()] {
-            add(&mut sum, *of_fragment);
+            sum.add(of_fragment);
         }
         let (object, source) = (faces.object(fragments[0]), faces.source(fragments[0]));
         let material = scene.mesh_of(object).material_of(source);
         let textures = scene.material(material);
         let has_picture =
             textures.base_color_texture.is_some() || textures.emissive_texture.is_some();
-        let (radiance, evenness) = match surfaces.constant(first as u32) {
-            Some(radiance) => (radiance, Evenness::Even),
+        let (radiance, evenness, opacity) = match surfaces.constant(first as u32) {
+            Some(radiance) => {
+                let opacity = surfaces.constant_opacity(first as u32).unwrap_or(1.0);
+                (radiance, Evenness::Even, opacity)
+            }
             None => {
-                let [r, g, b, area] = sum;
                 // An area too small for a float is too small to be seen: any colour will do.
-                let mean = |sum: f64| if area > 0.0 { (sum / area) as f32 } else { 0.0 };
+                let share = |sum: f64, of: f64| if of > 0.0 { (sum / of) as f32 } else { 0.0 };
+                let mean = |of_channel: f64| share(of_channel, sum.opacity);
                 let evenness = if has_picture {
                     Evenness::Picture
                 } else {
                     Evenness::Gradual
                 };
-                ([r, g, b].map(mean), evenness)
+                let opacity = share(sum.opacity, sum.area);
+                (sum.radiance.map(mean), evenness, opacity)
             }
         };
         let look = Look {
@@ -405,15 +476,39 @@ fn looks(scene: &Scene, map: &VisibilityMap, grid: &PixelGrid, unlit: bool) -> V
             material,
             radiance,
             evenness,
+            opacity,
         };
         looks.extend(fragments.iter().map(|_| look));
     }
     looks
 }
 
-fn add(sum: &mut [f64; 4], other: [f64; 4]) {
-    for (channel, other) in sum.iter_mut().zip(other) {
-        *channel += other;
+/// Sums over what is seen of a fragment.
+#[derive(Clone, Copy, Debug, Default)]
+struct LookSum {
+    /// Of area times opacity times radiance.
+    radiance: [f64; 3],
+    /// Of area times opacity.
+    opacity: f64,
+    /// In pixels.
+    area: f64,
+}
+
+impl LookSum {
+    fn of(area: f64, opacity: f64, radiance: [f32; 3]) -> Self {
+        Self {
+            radiance: radiance.map(|channel| area * opacity * f64::from(channel)),
+            opacity: area * opacity,
+            area,
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (channel, other) in self.radiance.iter_mut().zip(other.radiance) {
+            *channel += other;
+        }
+        self.opacity += other.opacity;
+        self.area += other.area;
     }
 }
 
@@ -478,13 +573,20 @@ fn paint_spans(
     let fragment_of = |face: FaceId| shown.partition_point(|&shown| shown < face) as u32;
     let mut canvas = Canvas::new(grid, Filter::Box, aovs);
     let maker = canvas.maker(scene, &textures, camera, faces, &shown);
+    let are_seen = scene.are_seen();
     let dice = |band: usize, buffers: &mut BandBuffers| {
         let first = band as u32 * BAND_ROWS;
         let rows = first..(first + BAND_ROWS).min(grid.height);
         let (dicer, parts) = (&mut buffers.span_dicer, &mut buffers.parts);
         dice::dice_spans(spans, rows, fragment_of, dicer, parts);
+        if let Some(are_seen) = &are_seen {
+            let is_seen = |fragment: u32| are_seen[faces.object(shown[fragment as usize]).index()];
+            parts.boundary.retain(|part| is_seen(part.fragment));
+            parts.runs.retain(|run| is_seen(run.fragment));
+        }
     };
-    canvas.paint(&surfaces, maker.as_ref(), None, grid, 0, dice);
+    let blended = Blended::default();
+    canvas.paint(&surfaces, maker.as_ref(), blended, grid, 0, dice);
     (canvas.picture, canvas.aovs)
 }
 
@@ -525,7 +627,7 @@ fn render_strips(
         let map = map_of(camera, strips.cut(strip).faces, strips.extent(strip));
         let [first, end] = [rows[strip], rows[strip + 1]];
         let grid = frame.window(0.0, first as f64, frame.width, (end - first) as u32);
-        canvas.paint_map(scene, &textures, &map, &grid, settings.unlit, first);
+        canvas.paint_map(scene, &textures, &map, &[], &grid, settings.unlit, first);
     }
     // What is found from the scene itself is shown as it is.
     Rendered {
@@ -542,21 +644,22 @@ struct BandBuffers {
     span_dicer: SpanDicer,
     parts: Parts,
     veils: VeilBuffers,
+    guests: GuestBuffers,
+    guest_light: Vec<GuestLight>,
     radiance: Radiance,
     sums: Vec<[f64; 4]>,
     aovs: AovBuffers,
 }
 
 impl BandBuffers {
-    /// Of the fragments in a band that are not even, ascending: the sum of area times radiance, and of
-    /// area.
+    /// Of the fragments in a band that are not even, ascending.
     fn fragment_sums(
         &mut self,
         surfaces: &Surfaces,
         map: &VisibilityMap,
         bands: &Bands,
         band: usize,
-    ) -> Vec<(u32, [f64; 4])> {
+    ) -> Vec<(u32, LookSum)> {
         let (grid, parts) = (bands.grid(), &mut self.parts);
         let varies = |fragment| surfaces.varies(fragment);
         dice::dice(map, bands, band, varies, &mut self.dicer, parts);
@@ -564,45 +667,78 @@ impl BandBuffers {
         parts.boundary.retain(|part| varies(part.fragment));
         parts.runs.retain(|run| varies(run.fragment));
         surfaces.shade(parts, grid, bands.rows(band).start, &mut self.radiance);
-        let mut values: Vec<(u32, [f64; 4])> = Vec::new();
-        let weighted = |area: f64, [r, g, b]: [f32; 3]| [r, g, b, 1.0].map(|c| area * f64::from(c));
-        for (part, &radiance) in parts.boundary.iter().zip(&self.radiance.boundary) {
-            values.push((part.fragment, weighted(f64::from(part.area), radiance)));
+        let mut values: Vec<(u32, LookSum)> = Vec::new();
+        // Veils come last.
+        let opacities = &self.radiance.opacities;
+        let opaque = std::iter::repeat_n(&1.0, parts.boundary.len() - opacities.len());
+        let opacities = opaque.chain(opacities).copied().map(f64::from);
+        let lit = parts.boundary.iter().zip(&self.radiance.boundary);
+        for ((part, &radiance), opacity) in lit.zip(opacities) {
+            let sum = LookSum::of(f64::from(part.area), opacity, radiance);
+            values.push((part.fragment, sum));
         }
         for (index, run) in parts.runs.iter().enumerate() {
-            let mut sum = [0.0; 4];
+            let mut sum = LookSum::default();
             for &radiance in self.radiance.of_run(index) {
-                add(&mut sum, weighted(1.0, radiance));
+                sum.add(&LookSum::of(1.0, 1.0, radiance));
             }
             values.push((run.fragment, sum));
         }
         values.sort_by_key(|value| value.0);
         let of_fragments = values.chunk_by(|a, b| a.0 == b.0);
-        let sum_up = |values: &[(u32, [f64; 4])]| {
-            let mut sum = [0.0; 4];
-            values.iter().for_each(|value| add(&mut sum, value.1));
+        let sum_up = |values: &[(u32, LookSum)]| {
+            let mut sum = LookSum::default();
+            values.iter().for_each(|value| sum.add(&value.1));
             (values[0].0, sum)
         };
         of_fragments.map(sum_up).collect()
     }
 
-    /// Shades the parts of a band that begins at `first_row`, puts the veils of the map `veiled` before
-    /// them, and sums them up.
+    /// Shades the parts of a band that begins at `first_row`, puts before them and between them what is
+    /// blended with them, and sums all up.
     fn finish(
         &mut self,
         surfaces: &Surfaces,
-        veiled: Option<&VisibilityMap>,
+        blended: Blended,
         grid: &PixelGrid,
         first_row: u32,
         pixels: &mut [[f32; 4]],
     ) {
-        surfaces.shade(&self.parts, grid, first_row, &mut self.radiance);
-        if let Some(map) = veiled {
-            let (opacities, parts) = (&self.radiance.opacities, &mut self.parts);
-            dice::attenuate(map, grid, first_row, opacities, &mut self.veils, parts);
+        let Self {
+            parts,
+            veils,
+            guests,
+            guest_light,
+            radiance,
+            sums,
+            ..
+        } = self;
+        surfaces.shade(parts, grid, first_row, radiance);
+        let opacities = &radiance.opacities;
+        let mut attenuate = |parts: &mut Parts| {
+            if let Some(map) = blended.veiled {
+                dice::attenuate(map, grid, first_row, opacities, veils, parts);
+            }
+        };
+        match blended.guests {
+            Some(layers) => {
+                layers.lay(first_row, opacities, guests, parts, guest_light, attenuate);
+            }
+            None => attenuate(parts),
         }
-        accumulate::box_filter(&self.parts, &self.radiance, &mut self.sums, pixels);
+        accumulate::box_filter(parts, radiance, sums, pixels);
+        if blended.guests.is_some() {
+            accumulate::add_guests(guest_light, pixels);
+        }
     }
+}
+
+/// What is blended with the parts of opaque fragments.
+#[derive(Clone, Copy, Default)]
+struct Blended<'a> {
+    /// The map, if it has veils.
+    veiled: Option<&'a VisibilityMap>,
+    guests: Option<&'a GuestLayers<'a>>,
 }
 
 fn material_of(scene: &Scene, faces: &Faces, face: FaceId) -> MaterialId {
@@ -1133,6 +1269,7 @@ mod tests {
         );
     }
 
+    #[test]
     fn a_material_made_transparent_after_its_map_was_found_is_named() {
         let opaque = scene_of(ground(2.0, 2), Material::default());
         let map = flat_map_of(&opaque, perspective(DVec3::new(1.0, -4.0, 1.5), 0.35, 1.0));

@@ -4,6 +4,7 @@ use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use crate::values::{self, Background};
 use clap::{Args, ValueEnum};
+use std::path::Path;
 use veduta::accumulate::Picture;
 use veduta::filter::Filter;
 use veduta::scene::Scene;
@@ -25,7 +26,8 @@ pub struct Look {
     /// its border, a pixel is the mean of what its filter reaches inside.
     #[arg(long, value_name = "NAME", default_value = "box")]
     filter: FilterArgument,
-    /// none, a colour such as #8ab4d8, or a picture, which is scaled to the frame
+    /// none, a colour such as #8ab4d8, a picture, which is scaled to the frame, or (for shade and
+    /// composite) a stored map of the same camera, all of which lies behind everything
     #[arg(long, value_name = "COLOUR|FILE", default_value = "none")]
     background: Background,
     /// auto, or doublings of light; by default auto for lit pictures for a display, else 0
@@ -90,6 +92,39 @@ impl Look {
         }
     }
 
+    /// The stored map that lies behind everything, if there is one.
+    pub fn background_map(&self) -> Option<&Path> {
+        match &self.background {
+            Background::Map(path) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// Fails for a stored map as background where that has no meaning, and tells why.
+    pub fn refuse_background_map_of(&self, why: &str) -> Result<(), Failure> {
+        match self.background_map() {
+            None => Ok(()),
+            Some(path) => {
+                let message = format!("{}: {why}", path.display());
+                Err(Failure::new(Code::Usage, message))
+            }
+        }
+    }
+
+    /// Fails for a stored map as background, for a verb that works with scenes.
+    pub fn refuse_background_map(&self) -> Result<(), Failure> {
+        let Some(path) = self.background_map() else {
+            return Ok(());
+        };
+        let message = format!(
+            "{}: a stored map is laid behind stored maps: make one of the scene (-o scene.veduta), then \
+             `veduta composite scene.veduta --background {} -o …`",
+            path.display(),
+            path.display()
+        );
+        Err(Failure::new(Code::Usage, message))
+    }
+
     /// Fails if a filter is asked for that has no meaning for what is made, and tells why.
     pub fn refuse_filter(&self, why: &str) -> Result<(), Failure> {
         if self.filter == FilterArgument::Box {
@@ -107,7 +142,8 @@ impl Look {
         talk: &mut Talk,
     ) -> Result<Development, Failure> {
         let backdrop = match &self.background {
-            Background::None => Backdrop::None,
+            // A map is part of what is shown when the picture is made.
+            Background::None | Background::Map(_) => Backdrop::None,
             Background::Color(color) => Backdrop::Color(*color),
             Background::Picture(path) => {
                 let loaded = read_picture(path)?;
@@ -140,15 +176,23 @@ impl Development {
     /// Only a lit picture for a display is exposed and toned unasked: linear formats are for further
     /// work, and unlit colours are to come through as they are.
     pub fn develop(&self, picture: &mut Picture, for_display: bool) -> f32 {
-        let unasked = for_display && !self.unlit;
-        let exposure = self.exposure.unwrap_or(if unasked {
+        let ev = tone::exposure_of(picture, self.exposure_asked(for_display));
+        self.develop_at(picture, ev, for_display);
+        ev
+    }
+
+    /// Whether the picture tells the exposure.
+    pub fn exposes_itself(&self, for_display: bool) -> bool {
+        self.exposure_asked(for_display) == Exposure::Auto
+    }
+
+    /// Only a lit picture for a display is exposed unasked.
+    fn exposure_asked(&self, for_display: bool) -> Exposure {
+        self.exposure.unwrap_or(if for_display && !self.unlit {
             Exposure::Auto
         } else {
             Exposure::Ev(0.0)
-        });
-        let ev = tone::exposure_of(picture, exposure);
-        self.develop_at(picture, ev, for_display);
-        ev
+        })
     }
 
     /// The colour behind a vector picture, if there is one.

@@ -6,6 +6,8 @@ pub mod composite;
 mod deep;
 pub mod diff;
 pub mod examples;
+pub mod frames;
+mod guests;
 pub mod info;
 mod look;
 pub mod man;
@@ -18,13 +20,15 @@ mod vector;
 
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
+use crate::values;
 use clap::{Args, ValueEnum};
 use output::Output;
 use std::path::Path;
 use veduta::pipeline::Shortcoming;
-use veduta::scene::Scene;
+use veduta::scene::{Scene, Shown};
 use veduta_io::{
-    Layers, LevelOfDetail, Loaded, PictureFormat, ReadOptions, UpAxis, closest_name, read_scene,
+    Layers, LevelOfDetail, Loaded, Moment, PictureFormat, ReadOptions, UpAxis, closest_name,
+    read_scene,
 };
 
 /// `--up-axis`
@@ -77,12 +81,51 @@ impl Reading {
         ReadOptions {
             up_axis: self.up_axis.map(UpAxis::from),
             level_of_detail: self.lod,
+            ..ReadOptions::default()
         }
     }
 }
 
-/// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.
-fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result<Loaded, Failure> {
+/// The moment of what moves.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Time")]
+pub struct When {
+    /// Show this frame of what moves, counted from 0; a second has as many as the scene file says, else 24
+    #[arg(long, value_name = "N", conflicts_with = "time")]
+    frame: Option<u32>,
+    /// Show this moment of what moves, such as 1.5s; without, models stand at rest, and scene files are as
+    /// at 0s
+    #[arg(long, value_name = "TIME", value_parser = values::time)]
+    time: Option<f64>,
+    /// The animation of the model that is shown; its first by default
+    #[arg(long, value_name = "NAME")]
+    animation: Option<String>,
+}
+
+impl When {
+    /// Whether another moment than that at rest is asked for.
+    fn is_asked_for(&self) -> bool {
+        self.frame.is_some() || self.time.is_some() || self.animation.is_some()
+    }
+
+    fn options(&self, reading: &Reading) -> ReadOptions {
+        let moment = match (self.frame, self.time) {
+            (Some(frame), _) => Moment::Frame(frame),
+            (None, Some(seconds)) => Moment::Seconds(seconds),
+            // One that is asked for is shown from its beginning.
+            (None, None) if self.animation.is_some() => Moment::Seconds(0.0),
+            (None, None) => Moment::Rest,
+        };
+        ReadOptions {
+            moment,
+            animation: self.animation.clone(),
+            ..reading.options()
+        }
+    }
+}
+
+/// Refuses what is no file of a model or scene.
+fn refuse_no_model(path: &Path) -> Result<(), Failure> {
     if path.is_dir() {
         let message = format!("{}: is a folder; name the model in it", path.display());
         return Err(Failure::new(Code::InputOutput, message));
@@ -94,8 +137,19 @@ fn load(path: &Path, reading: &Reading, strict: bool, talk: &mut Talk) -> Result
         );
         return Err(Failure::new(Code::Unsupported, message));
     }
+    Ok(())
+}
+
+/// Reads a scene and tells what was read otherwise than its file asks for; if `strict`, fails on it.
+fn load(
+    path: &Path,
+    options: &ReadOptions,
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<Loaded, Failure> {
+    refuse_no_model(path)?;
     talk.begin("reading");
-    let loaded = read_scene(path, &reading.options())?;
+    let loaded = read_scene(path, options)?;
     talk.end();
     for warning in &loaded.warnings {
         if strict {
@@ -116,20 +170,36 @@ fn tell_shortcomings(
     talk: &mut Talk,
 ) -> Result<(), Failure> {
     let file = file.display();
-    for shortcoming in shortcomings {
-        let message = match shortcoming {
-            Shortcoming::DrawnOpaque(material) => {
-                let name = &scene.material(*material).name;
-                format!(
-                    "{file}: the material {name:?} is not opaque any more, but drawn so: what is \
-                     behind is not in the map; make the map of a scene with that material"
-                )
-            }
-            Shortcoming::VeilsLeftOut(count) => {
-                format!("{file}: {count} pieces of surfaces that are not opaque are left out")
-            }
-            other => format!("{file}: not shown as it should be: {other:?}"),
-        };
+    let mut messages = Vec::new();
+    for layer in &scene.layers {
+        let name = &layer.name;
+        messages.extend(match layer.shown {
+            Shown::CasterOnly => Some(format!(
+                "{file}: the layer {name:?} only casts shadows, and there are none yet: it gives nothing"
+            )),
+            Shown::ShadowOnly => Some(format!(
+                "{file}: the layer {name:?} only catches shadows, and there are none yet: it hides what \
+                 is behind it and gives nothing"
+            )),
+            _ => None,
+        });
+    }
+    // A layer whose objects differ in it stands there several times.
+    messages.dedup();
+    messages.extend(shortcomings.iter().map(|shortcoming| match shortcoming {
+        Shortcoming::DrawnOpaque(material) => {
+            let name = &scene.material(*material).name;
+            format!(
+                "{file}: the material {name:?} is not opaque any more, but drawn so: what is \
+                 behind is not in the map; make the map of a scene with that material"
+            )
+        }
+        Shortcoming::VeilsLeftOut(count) => {
+            format!("{file}: {count} pieces of surfaces that are not opaque are left out")
+        }
+        other => format!("{file}: not shown as it should be: {other:?}"),
+    }));
+    for message in messages {
         if strict {
             let message = format!("{message} (an error because of --strict)");
             return Err(Failure::new(Code::Unsupported, message));

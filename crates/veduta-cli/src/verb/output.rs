@@ -17,7 +17,7 @@ use veduta_io::{
 };
 
 /// Where a picture goes, and as what.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Output")]
 pub struct Output {
     /// The picture; its suffix chooses the format. - writes to stdout, as .png or as --format says
@@ -150,6 +150,21 @@ pub enum Place {
 impl Output {
     /// The most names of a pixel in a Cryptomatte: 99 layers of two.
     pub const MOST_RANKS: u8 = 198;
+
+    /// The name of the files, for a verb that writes several.
+    pub fn file(&self) -> Result<&Path, Failure> {
+        let message = "frames are written by -o FILE; --preview is for veduta render";
+        let output = self.output.as_deref();
+        output.ok_or_else(|| Failure::new(Code::Usage, message))
+    }
+
+    /// The same in another file.
+    pub fn at(&self, file: &Path) -> Self {
+        Self {
+            output: Some(file.to_owned()),
+            ..self.clone()
+        }
+    }
 
     /// The place of a stored map, if one is asked for.
     pub fn map_place(&self) -> Option<&Path> {

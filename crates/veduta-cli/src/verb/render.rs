@@ -3,7 +3,7 @@ use super::look::Look;
 use super::output::{Output, Target};
 use super::stored::{Stored, refuse_place, tell_work};
 use super::vector::{Subject, Vector, VectorTarget};
-use super::{Reading, load, tell_of_mattes, tell_shortcomings, unknown_name};
+use super::{Reading, When, load, tell_of_mattes, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
@@ -67,6 +67,8 @@ pub struct Render {
     #[command(flatten)]
     view: View,
     #[command(flatten)]
+    when: When,
+    #[command(flatten)]
     look: Look,
     #[command(flatten)]
     vector: Vector,
@@ -88,6 +90,8 @@ Examples:
       veduta render town.obj -o town.exr --aov depth,normal,crypto-object
   A drawing for print, with lines of a quarter of a millimetre:
       veduta render town.obj -o town.pdf --lines crease --line-width 0.25mm
+  A moment of what moves:
+      veduta render voyage.toml --frame 36 -o a.png
   Lines only, for an illustration:
       veduta render town.obj -o a.svg --fill none --lines silhouette,crease
   What is seen, kept for any number of pictures; and with all that is not seen, for shadows:
@@ -135,6 +139,7 @@ impl Render {
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
 
     pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        self.look.refuse_background_map()?;
         if let Some(target) = self.output.vector_target(&self.model, json)? {
             self.refuse_self_contained()?;
             return self.draw(&target, json, talk);
@@ -151,7 +156,7 @@ impl Render {
                 "filters weigh exact regions, which --sampling multiscan does not find",
             )?;
         }
-        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let loaded = self.load(talk)?;
         // Of the whole scene, so that pictures of its layers fit one on the other.
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
         if let Some(target) = &target {
@@ -241,6 +246,11 @@ impl Render {
         Ok(())
     }
 
+    fn load(&self, talk: &mut Talk) -> Result<Loaded, Failure> {
+        let options = self.when.options(&self.view.reading);
+        load(&self.model, &options, self.strict, talk)
+    }
+
     /// Where the deep picture goes, if one is asked for.
     fn deep_target<'a>(
         &self,
@@ -312,7 +322,7 @@ impl Render {
         }
         self.look.refuse_filter("a vector picture has no pixels")?;
         let settings = self.vector.drawing(target.format)?;
-        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let loaded = self.load(talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
@@ -352,7 +362,7 @@ impl Render {
             return Err(Failure::new(Code::Usage, message));
         }
         self.look.refuse_filter("a map is of no picture")?;
-        let loaded = load(&self.model, &self.view.reading, self.strict, talk)?;
+        let loaded = self.load(talk)?;
         let (camera, size) = self.view.camera(&self.model, &loaded, self.size)?;
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
@@ -406,7 +416,8 @@ impl Render {
         };
         Origin {
             sources: files,
-            casters: Some(casters),
+            // Files that are read again are read at rest.
+            casters: (self.self_contained || !self.when.is_asked_for()).then_some(casters),
         }
     }
 
@@ -527,7 +538,7 @@ impl View {
 
     /// The name of the camera that is to be used, if it has one: the one asked for, else that which
     /// the scene file means.
-    fn camera_name<'a>(&'a self, loaded: &'a Loaded) -> Option<&'a str> {
+    pub(super) fn camera_name<'a>(&'a self, loaded: &'a Loaded) -> Option<&'a str> {
         match (&self.camera, self.eye) {
             (Some(name), _) => Some(name.as_str()).filter(|name| *name != "auto"),
             (None, Some(_)) => None,

@@ -1,14 +1,19 @@
 //! What the verbs that work with stored maps share.
 
+use super::look::Look;
 use super::refuse_to_replace;
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use clap::Args;
 use serde_json::Value;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use veduta::accumulate::{AovSettings, Aovs, Picture};
+use veduta::composite::{CompositeError, lay_on, see_through};
 use veduta::dice::PixelGrid;
 use veduta::filter::Filter;
+use veduta::map::file::{FileError, MapReader};
 use veduta::map::{Camera, Faces, Origin, SeenScene, SeenSpans, TooFewSubScanlines};
 use veduta::pipeline::{self, Shortcoming};
 use veduta::scene::Scene;
@@ -28,6 +33,90 @@ pub fn open(path: &Path) -> Result<OpenMap, Failure> {
         return Err(Failure::new(Code::Usage, message));
     }
     Ok(open_map(path)?)
+}
+
+/// Whether cameras may differ.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Trust {
+    /// Take all maps as seen by the camera of the first, whatever theirs was: what they show at a point
+    /// of the frame, and how near, stays
+    #[arg(long)]
+    trust_camera: bool,
+}
+
+impl Trust {
+    /// Whether they may.
+    pub fn camera(self) -> bool {
+        self.trust_camera
+    }
+
+    /// `seen`, of the file `path`, as if the camera of `first` had seen it, if that is asked for.
+    pub fn apply(
+        self,
+        path: &Path,
+        seen: SeenScene,
+        first: &SeenScene,
+    ) -> Result<SeenScene, Failure> {
+        if !self.trust_camera {
+            return Ok(seen);
+        }
+        let mut through = see_through(&seen, &first.map.camera).map_err(|error| {
+            let message = format!("{}: {error}", path.display());
+            Failure::new(Code::BadInput, message)
+        })?;
+        through.scene.world = first.scene.world.clone();
+        Ok(through)
+    }
+}
+
+/// Lays `front` on the map that is asked for as a background. `read` reads what is needed of it.
+pub fn laid_on(
+    front: SeenScene,
+    look: &Look,
+    trust: Trust,
+    read: impl FnOnce(&mut MapReader<BufReader<File>>) -> Result<SeenScene, FileError>,
+) -> Result<SeenScene, Failure> {
+    let Some(path) = look.background_map() else {
+        return Ok(front);
+    };
+    let background = trust.apply(path, open(path)?.read(read)?, &front)?;
+    lay_on(&front, &background).map_err(|error| refusal(&error, &[Path::new("the maps"), path]))
+}
+
+/// Fails for a filter that reaches beyond the pixels into which guests are laid.
+pub fn refuse_filter_of_guests(file: &Path, seen: &Stored, look: &Look) -> Result<(), Failure> {
+    if !matches!(seen, Stored::Regions(seen) if !seen.guests.is_empty()) {
+        return Ok(());
+    }
+    let why = "pictures of other programs are laid into pixels by area";
+    look.refuse_filter(&format!("{}: {why}", file.display()))
+}
+
+/// What is wrong, with the names of the files.
+pub fn refusal(error: &CompositeError, files: &[&Path]) -> Failure {
+    let message = match error {
+        CompositeError::OtherCamera { index, difference } => format!(
+            "{}: cannot be composited with {}: {difference}; --trust-camera takes it as it is",
+            files[*index].display(),
+            files[0].display()
+        ),
+        CompositeError::OtherWorld { index, difference }
+        | CompositeError::OtherSampling { index, difference } => format!(
+            "{}: cannot be composited with {}: {difference}",
+            files[*index].display(),
+            files[0].display()
+        ),
+        CompositeError::Guests { index } => {
+            let message = format!(
+                "{}: holds pictures of other programs, which only hide by depth and are hidden by it: they \
+                 cannot hold out, be cut by --in, --out or --atop, nor stand before a map as background",
+                files[*index].display()
+            );
+            return Failure::new(Code::Unsupported, message);
+        }
+        other => other.to_string(),
+    };
+    Failure::new(Code::BadInput, message)
 }
 
 /// Other colours and textures for the materials of a map.
@@ -174,12 +263,7 @@ impl Stored {
         aovs: AovSettings,
     ) -> Result<(Picture, Aovs), TooFewSubScanlines> {
         match self {
-            Self::Regions(seen) => {
-                let (scene, map) = (&seen.scene, &seen.map);
-                Ok(pipeline::render_channels(
-                    scene, map, grid, unlit, filter, aovs,
-                ))
-            }
+            Self::Regions(seen) => Ok(pipeline::render_seen(seen, grid, unlit, filter, aovs)),
             Self::Spans(seen) => pipeline::render_spans(seen, grid, unlit, aovs),
         }
     }

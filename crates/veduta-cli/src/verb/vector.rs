@@ -12,9 +12,9 @@ use std::io;
 use std::path::Path;
 use veduta::accumulate::Picture;
 use veduta::dice::PixelGrid;
-use veduta::drawing::{self, Drawing, Evenness, LineKind, Shape};
+use veduta::drawing::{self, Drawing, Evenness, Joining, LineKind};
 use veduta::map::VisibilityMap;
-use veduta::pipeline::{self, Shortcoming};
+use veduta::pipeline;
 use veduta::scene::Scene;
 use veduta_io::{VectorFormat, VectorOptions, WriteProblem, stream_drawing, write_drawing};
 
@@ -27,8 +27,8 @@ pub struct Vector {
     /// What fills shapes: faces, their colours; none, for lines only
     #[arg(long, value_name = "WHAT")]
     fill: Option<Fill>,
-    /// Visible edges to draw as lines: silhouette, boundary (of a single face), crease; several with
-    /// commas between them
+    /// Edges to draw as lines: silhouette, boundary (of a single face), crease; hidden, for where those are
+    /// hidden; several with commas between them
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     lines: Vec<Line>,
     /// Width of the lines, such as 0.5px or 0.35mm (96 pixels to 25.4 mm); 1px by default
@@ -40,11 +40,11 @@ pub struct Vector {
     /// The angle between two faces from which on their edge is a crease; 30deg by default
     #[arg(long, value_name = "ANGLE", value_parser = values::crease_angle)]
     crease_angle: Option<f64>,
-    /// How far shapes reach under those on top of them, in pixels, so that viewers show no seams; 4 by
-    /// default, enough to view the picture at three quarters of its size. 0 for outlines as they are seen
+    /// How far shapes reach under those on top of them, in pixels, so that viewers show no seams; 2 by
+    /// default, enough to view the picture at nine tenths of its size. 0 for outlines as they are seen
     #[arg(long, value_name = "PIXELS", value_parser = values::trap)]
     trap: Option<f64>,
-    /// Decimals of coordinates, in pixels: 0 to 9; 3 by default
+    /// Decimals of coordinates, in pixels: 0 to 9; 2 by default
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=9))]
     decimals: Option<u8>,
 }
@@ -65,6 +65,8 @@ enum Line {
     Boundary,
     /// Edges of two faces at an angle, and where faces pierce one another
     Crease,
+    /// Edges of the other kinds given, dashed where they are hidden
+    Hidden,
 }
 
 impl Vector {
@@ -100,6 +102,11 @@ impl Vector {
         if !self.has_shapes() && !has_lines {
             return usage("--fill none leaves nothing to draw without --lines");
         }
+        if has_lines && self.lines.iter().all(|line| *line == Line::Hidden) {
+            return usage(
+                "--lines hidden goes with the kinds of edges to draw: --lines silhouette,crease,hidden",
+            );
+        }
         if has_lines && !format.has_lines() {
             return usage("--lines is for .svg and .pdf: .geojson holds shapes");
         }
@@ -116,6 +123,12 @@ impl Vector {
                 None if format.has_lines() => usual.trap,
                 None => 0.0,
             },
+            // Layers of maps are made of surfaces.
+            joining: if format.has_lines() {
+                Joining::Colors
+            } else {
+                Joining::Surfaces
+            },
             shapes: self.has_shapes(),
             lines: self
                 .lines
@@ -124,6 +137,7 @@ impl Vector {
                     Line::Silhouette => LineKind::Silhouette,
                     Line::Boundary => LineKind::Boundary,
                     Line::Crease => LineKind::Crease,
+                    Line::Hidden => LineKind::Hidden,
                 })
                 .collect(),
             crease_angle: self.crease_angle.unwrap_or(usual.crease_angle),
@@ -148,10 +162,7 @@ impl Vector {
             strict,
         } = *subject;
         let background = development.plain_background()?;
-        let mut shortcomings = pipeline::shortcomings(scene, map);
-        if !map.veils.is_empty() {
-            shortcomings.push(Shortcoming::VeilsLeftOut(map.veils.len()));
-        }
+        let shortcomings = pipeline::shortcomings(scene, map);
         tell_shortcomings(file, scene, &shortcomings, strict, talk)?;
         talk.begin("drawing");
         let mut drawing = pipeline::draw_window(scene, map, grid, unlit, settings);
@@ -162,17 +173,19 @@ impl Vector {
             talk.begin("developing");
             let mut picture = pipeline::render_window(scene, map, grid, unlit);
             ev = development.develop(&mut picture, true);
-            let mut colors = picture_of_colors(&drawing);
+            let mut colors = picture_of_colors(&mut drawing);
             development.develop_at(&mut colors, ev, true);
-            for (shape, &[r, g, b, _]) in drawing.shapes.iter_mut().zip(&colors.pixels) {
-                shape.radiance = [r, g, b];
+            let mut developed = colors.pixels.iter().map(|&[r, g, b, _]| [r, g, b]);
+            for (radiance, color) in radiances(&mut drawing).zip(&mut developed) {
+                *radiance = color;
             }
         }
         talk.begin("writing");
         let title = file.file_name().unwrap_or_default().to_string_lossy();
         target.write(&drawing, &self.options(title.into_owned(), background))?;
         talk.end();
-        let (shapes, strokes) = (drawing.shapes.len(), drawing.strokes.len());
+        let shapes = drawing.shapes.len() + drawing.veils.len();
+        let strokes = drawing.strokes.len();
         talk.detail(format_args!(
             "{} fragments, {shapes} shapes, {strokes} lines, exposure {ev:.2} EV",
             map.opaque.len()
@@ -230,7 +243,7 @@ fn tell_means(
         "{}: {uneven} of {} shapes have the mean of their colours, which differ from point to point \
          (textures, smooth normals, colours at corners)",
         file.display(),
-        drawing.shapes.len()
+        drawing.shapes.len() + drawing.veils.len()
     );
     if strict {
         let message = format!("{message} (an error because of --strict)");
@@ -242,22 +255,32 @@ fn tell_means(
 
 /// How many shapes have the mean of several colours.
 fn uneven_shapes(drawing: &Drawing) -> usize {
-    let shapes = drawing.shapes.iter();
+    let shapes = drawing.shapes.iter().map(|shape| shape.evenness);
+    let veils = drawing.veils.iter().map(|veil| veil.evenness);
     shapes
-        .filter(|shape| shape.evenness != Evenness::Even)
+        .chain(veils)
+        .filter(|evenness| *evenness != Evenness::Even)
         .count()
 }
 
-/// A pixel for each shape, so that their colours are developed as those of pictures are.
-fn picture_of_colors(drawing: &Drawing) -> Picture {
-    let pixel = |shape: &Shape| {
-        let [r, g, b] = shape.radiance;
-        [r, g, b, 1.0]
-    };
+/// All that is to be developed.
+fn radiances(drawing: &mut Drawing) -> impl Iterator<Item = &mut [f32; 3]> {
+    let shapes = drawing.shapes.iter_mut().map(|shape| &mut shape.radiance);
+    let veils = drawing.veils.iter_mut().map(|veil| &mut veil.radiance);
+    let beneath = drawing.underpainting.iter_mut();
+    let beneath = beneath.map(|beneath| &mut beneath.radiance);
+    shapes.chain(veils).chain(beneath)
+}
+
+/// A pixel for each, so that they are developed as pictures are.
+fn picture_of_colors(drawing: &mut Drawing) -> Picture {
+    let pixels: Vec<_> = radiances(drawing)
+        .map(|&mut [r, g, b]| [r, g, b, 1.0])
+        .collect();
     Picture {
-        width: drawing.shapes.len() as u32,
+        width: pixels.len() as u32,
         height: 1,
-        pixels: drawing.shapes.iter().map(pixel).collect(),
+        pixels,
     }
 }
 

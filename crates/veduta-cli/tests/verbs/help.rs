@@ -7,6 +7,7 @@ const VERBS: &[&str] = &[
     "render",
     "shade",
     "composite",
+    "frames",
     "info",
     "check",
     "diff",
@@ -35,6 +36,14 @@ fn every_example_of_every_help_text_works() {
     // Nearer, so that another near plane suits it.
     folder.write("hut.obj", "o hut\nv 0 0 2\nv 1 0 2\nv 0 1 2\nf 1 2 3\n");
     folder.told("render town.obj --size 64x48 --unlit --depth 16 -o deep.png");
+    // A small one that moves.
+    folder.write(
+        "voyage.toml",
+        "[camera.shore]\neye = [9, -9, 5]\nlook_at = [0, 0, 0]\nsize = [64, 48]\n\
+         [[layer]]\nname = \"town\"\nmodel = \"town.obj\"\n\
+         [[layer]]\nname = \"hut\"\nmodel = \"hut.obj\"\n\
+         keys = [{ time = 0, translate = [0, 0, 0] }, { time = 2, translate = [1, 0, 0] }]\n",
+    );
     // The program by its name.
     let path = std::env::var_os("PATH").unwrap_or_default();
     let bin = program().parent().expect("a folder").to_owned();

@@ -7,6 +7,7 @@ mod diff;
 mod endings;
 mod examples;
 mod filters;
+mod frames;
 mod help;
 mod info;
 mod pictures;

@@ -183,3 +183,151 @@ impl Fails for assert_cmd::Command {
         String::from_utf8(failed.get_output().stderr.clone()).expect("text")
     }
 }
+
+#[test]
+fn operators_keep_what_lies_in_out_of_and_on_another_map() {
+    let folder = folder_of_two();
+    let show = |arguments: &str| {
+        folder.told(&format!("composite {arguments} --unlit -o found.png"));
+        png(&folder.read("found.png")).2
+    };
+    let (red, blue) = ([255, 0, 0, 255], [0, 0, 255, 255]);
+    let count = |pixels: &[[u8; 4]], color| pixels.iter().filter(|p| **p == color).count();
+    let [wall, square] = ["wall", "box"].map(|name| show(&format!("{name}.veduta")));
+    let [wall, square] = [count(&wall, red), count(&square, blue)];
+    // The square lies before a quarter of the wall.
+    let inside = show("wall.veduta --in box.veduta");
+    assert_eq!([count(&inside, red), count(&inside, blue)], [square, 0]);
+    let outside = show("wall.veduta --out box.veduta");
+    assert_eq!(
+        [count(&outside, red), count(&outside, blue)],
+        [wall - square, 0]
+    );
+    let atop = show("box.veduta --atop wall.veduta");
+    assert_eq!(
+        [count(&atop, red), count(&atop, blue)],
+        [wall - square, square]
+    );
+    let matte = show("wall.veduta box.veduta --matte box");
+    assert_eq!(
+        [count(&matte, red), count(&matte, blue)],
+        [wall - square, 0]
+    );
+    let behind = show("wall.veduta --background box.veduta");
+    assert_eq!([count(&behind, red), count(&behind, blue)], [wall, 0]);
+    // Stored, it is still a matte, and holes are still holes.
+    folder.told("composite box.veduta --matte box -o matte.veduta");
+    let through = show("wall.veduta matte.veduta");
+    assert_eq!(
+        [count(&through, red), count(&through, blue)],
+        [wall - square, 0]
+    );
+    folder.told("composite box.veduta --out box.veduta -o none.veduta");
+    let through = show("wall.veduta none.veduta");
+    assert_eq!(count(&through, red), wall);
+    folder.told("shade wall.veduta --unlit --background box.veduta -o found.png");
+    assert!(png(&folder.read("found.png")).2 == behind);
+    let refused = folder.veduta("render wall.obj --background box.veduta -o a.png");
+    assert!(refused.error_of(2).contains("composite"));
+}
+
+#[test]
+fn maps_of_other_cameras_are_taken_only_on_trust() {
+    let folder = folder_of_two();
+    folder.told("render box.obj --eye 3,-4,9 --fov 50deg --size 8x8 -o other.veduta");
+    folder.told("render wall.obj --eye 0,-9,9 --fov 30deg --size 8x8 -o wall.veduta --force");
+    let refused = folder.veduta("composite wall.veduta other.veduta -o a.png");
+    let text = refused.error_of(4);
+    assert!(
+        text.contains("other.veduta") && text.contains("--trust-camera"),
+        "{text}"
+    );
+    let refused = folder.veduta("shade wall.veduta --background other.veduta -o a.png");
+    assert!(refused.error_of(4).contains("--trust-camera"));
+    folder.told("shade other.veduta --unlit -o expected.png");
+    folder.told(
+        "composite wall.veduta other.veduta --without wall --trust-camera --unlit -o found.png",
+    );
+    assert!(folder.read("found.png") == folder.read("expected.png"));
+}
+
+#[test]
+fn pictures_of_other_programs_composite_by_depth_and_are_stored() {
+    let folder = folder_of_two();
+    folder.told("composite wall.veduta box.veduta --unlit -o expected.exr");
+    folder.told(&format!(
+        "render box.obj {FACING} --unlit -o box.exr --aov depth"
+    ));
+    folder.told(&format!(
+        "render box.obj {FACING} --unlit -o deep.exr --deep"
+    ));
+    for (guest, kind) in [
+        ("box.exr", "picture with depths"),
+        ("deep.exr", "deep picture"),
+    ] {
+        let asked = format!("composite wall.veduta {guest} --depth-kind planar --unlit");
+        let told = folder.json(&format!("{asked} -o found.exr"));
+        let inputs = &told["inputs"];
+        assert_eq!(inputs[0]["exactness"], "exact");
+        assert_eq!(
+            (&inputs[1]["file"], &inputs[1]["kind"]),
+            (&json!(guest), &json!(kind))
+        );
+        assert_eq!(
+            told["warnings"],
+            json!([]),
+            "they tell the camera, and the kind was told"
+        );
+        folder.told("diff expected.exr found.exr --tolerance 1e-5");
+        folder.told(&format!("{asked} -o kept.veduta --force"));
+        folder.told("check kept.veduta");
+        folder.told("shade kept.veduta --unlit -o again.exr");
+        assert!(folder.read("again.exr") == folder.read("found.exr"));
+        let told = folder.json("info kept.veduta");
+        assert_eq!(told["guests"][0]["name"], guest);
+        folder.told(&format!(
+            "composite {guest} --holdout wall.veduta --depth-kind planar -o a.exr"
+        ));
+    }
+    // Two guests without a map.
+    folder.told("composite deep.exr box.exr --depth-kind planar -o found.exr");
+    // A card before and behind; the eye is 5 m before the wall.
+    folder.told(&format!("render box.obj {FACING} --unlit -o box.png"));
+    let blue = |arguments: &str| {
+        folder.told(&format!("composite {arguments} --unlit -o found.png"));
+        let pixels = png(&folder.read("found.png")).2;
+        pixels
+            .iter()
+            .filter(|pixel| **pixel == [0, 0, 255, 255])
+            .count()
+    };
+    assert!(blue("wall.veduta box.png@4m") > 0);
+    assert_eq!(blue("wall.veduta box.png@6m"), 0);
+
+    for (arguments, code, words) in [
+        ("wall.veduta box.png", 2, "box.png@12m"),
+        ("wall.veduta box.png@far", 2, "after @"),
+        ("wall.veduta box.exr --depth-kind ndc", 2, "--depth-near"),
+        ("wall.veduta box.exr --depth-near 1", 2, "ndc"),
+        ("wall.veduta expected.exr", 4, "no channel of depth"),
+        ("wall.veduta --in kept.veduta", 5, "kept.veduta"),
+        (
+            "kept.veduta --background wall.veduta",
+            5,
+            "pictures of other programs",
+        ),
+    ] {
+        let refused = folder.veduta(&format!("composite {arguments} -o a.png"));
+        let text = refused.error_of(code);
+        assert!(text.contains(words), "{arguments}: {text}");
+    }
+    folder.told("render box.obj --eye 0,-5,0.5 --look-at 0,0,0 --parallel 4 --size 8x8 -o other.exr --aov depth");
+    let refused = folder.veduta("composite wall.veduta other.exr -o a.png");
+    assert!(refused.error_of(4).contains("--trust-camera"));
+    folder.told(
+        &format!("render box.obj {FACING} --size 8x6 -o flat.exr --aov depth")
+            .replace("--size 8x8 ", ""),
+    );
+    let refused = folder.veduta("composite wall.veduta flat.exr -o a.png");
+    assert!(refused.error_of(4).contains("same camera"));
+}

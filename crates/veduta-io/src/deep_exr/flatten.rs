@@ -84,9 +84,38 @@ impl Flattener {
         self.colors.iter().any(Option::is_some)
     }
 
+    /// The channels of rows that matter.
+    pub fn channels<'r>(&self, rows: &'r DeepPixels) -> Vec<&'r Samples> {
+        self.used.iter().map(|&k| &rows.channels()[k]).collect()
+    }
+
+    /// How these go together.
+    pub fn roles(&self) -> &Roles {
+        &self.roles
+    }
+
+    /// Colour and opacity of a sample of a pixel with these values.
+    pub fn color_and_opacity(&self, values: &[f64], sample: usize) -> ([f64; 3], f64) {
+        let values = &values[sample * self.used.len()..(sample + 1) * self.used.len()];
+        let color = self
+            .colors
+            .map(|color| color.map_or(0.0, |channel| values[channel]));
+        let mean = || {
+            self.opacities
+                .iter()
+                .map(|&k| within_0_and_1(values[k]))
+                .sum::<f64>()
+                / 3.0
+        };
+        (
+            color,
+            self.opacity.map_or_else(mean, |channel| values[channel]),
+        )
+    }
+
     /// Makes rows flat: linear, premultiplied.
     pub fn flatten(&self, rows: &DeepPixels) -> Vec<[f32; 4]> {
-        let channels: Vec<&Samples> = self.used.iter().map(|&k| &rows.channels()[k]).collect();
+        let channels = self.channels(rows);
         (0..rows.rows() * rows.width())
             .into_par_iter()
             .with_min_len(1024)

@@ -19,6 +19,7 @@ mod bytes;
 mod camera;
 mod error;
 mod flatten;
+mod guest;
 mod header;
 mod image;
 mod manifest;

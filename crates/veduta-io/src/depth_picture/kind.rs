@@ -41,7 +41,7 @@ impl DepthKind {
     }
 
     /// Fails if the kind makes no sense.
-    pub(super) fn check(&self, camera: Option<&Camera>) -> Result<(), DepthProblem> {
+    pub(crate) fn check(&self, camera: Option<&Camera>) -> Result<(), DepthProblem> {
         let Self::Device { near, far, .. } = *self else {
             return Ok(());
         };

@@ -64,6 +64,8 @@ pub struct DepthPicture {
     pub channel: String,
     /// The camera that was given, or that of the file.
     pub camera: Option<Camera>,
+    /// That of the file, if it tells one.
+    pub file_camera: Option<Camera>,
     /// What a user should know; sentences without the file's name.
     pub warnings: Vec<String>,
 }
@@ -200,7 +202,8 @@ fn depth_picture(
     let (width, height) = check_size(size.x() as u64, size.y() as u64, input)?;
     let found = Found::of(&names(image), options.channel.as_deref())?;
     let mut warnings = Vec::new();
-    let camera = options.camera.or_else(|| camera_of(image));
+    let file_camera = camera_of(image);
+    let camera = options.camera.or(file_camera);
     let kind = options.kind.unwrap_or_else(|| {
         let (kind, sentence) = guess(image, &found.depth_name);
         warnings.push(sentence);
@@ -249,6 +252,7 @@ fn depth_picture(
         kind,
         channel: found.depth_name,
         camera,
+        file_camera,
         warnings,
     })
 }

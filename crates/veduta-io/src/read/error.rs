@@ -56,9 +56,10 @@ impl ReadError {
             | Problem::RequiredExtension { .. }
             | Problem::RemoteUri(_)
             | Problem::NotYet { .. } => ErrorKind::Unsupported,
-            Problem::NotThere { .. } | Problem::NoBinChunk | Problem::NoFile { .. } => {
-                ErrorKind::Missing
-            }
+            Problem::NotThere { .. }
+            | Problem::NoBinChunk
+            | Problem::NoFile { .. }
+            | Problem::NoAnimation { .. } => ErrorKind::Missing,
             _ => ErrorKind::BadInput,
         }
     }
@@ -211,6 +212,14 @@ pub enum Problem {
     /// A `data:` URI that does not decode.
     #[error("is no valid data URI: {0}")]
     DataUri(String),
+    /// The animation that was asked for does not exist.
+    #[error("has no animation {name:?}; {help}")]
+    NoAnimation {
+        /// The name that was asked for.
+        name: String,
+        /// What may be meant.
+        help: String,
+    },
     /// An index to a row that does not exist.
     #[error("refers to {what} {index}, counted from 0, but the file has {count}")]
     NoSuch {

@@ -13,6 +13,7 @@ mod files;
 mod finish;
 #[cfg(feature = "gltf")]
 mod gltf;
+mod moment;
 #[cfg(any(
     feature = "gltf",
     feature = "cityjson",
@@ -22,6 +23,7 @@ mod gltf;
 mod names;
 #[cfg(feature = "obj")]
 mod obj;
+mod over_time;
 #[cfg(any(
     feature = "gltf",
     feature = "obj",
@@ -45,13 +47,17 @@ mod vertices;
 #[cfg(feature = "cityjson")]
 pub use cityjson::{LevelOfDetail, LevelOfDetailError};
 pub use error::{Detail, ErrorKind, Excerpt, Place, Problem, ReadError, Warning};
+pub use moment::{Animation, AnimationKind, Moment};
 #[cfg(feature = "toml")]
 pub use names::closest as closest_name;
+pub use over_time::SceneOverTime;
 #[cfg(feature = "toml")]
 pub use scene_file::{change_scene, scene_file_schema, set_in_scene};
 
 use budget::Budget;
 use error::{Fault, Warnings};
+use moment::USUAL_FRAMES_PER_SECOND;
+use over_time::Models;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -68,7 +74,7 @@ pub enum UpAxis {
 }
 
 /// How to read a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
     /// The axis that points upwards; `None` for what is usual in the format.
     pub up_axis: Option<UpAxis>,
@@ -76,6 +82,13 @@ pub struct ReadOptions {
     /// lowest; `None` for the highest.
     #[cfg(feature = "cityjson")]
     pub level_of_detail: Option<LevelOfDetail>,
+    /// The moment at which everything that moves is shown.
+    pub moment: Moment,
+    /// The name of the animation of a glTF model that is played, unless the moment is at rest; `None`
+    /// for its first. Scene files say of each layer what is played.
+    pub animation: Option<String>,
+    /// Whether that begins again when it is over; else the model stays as at its end.
+    pub repeats: bool,
 }
 
 /// A scene, and what was read otherwise than the file asks for.
@@ -92,6 +105,10 @@ pub struct Loaded {
     /// Widths and heights in pixels that cameras of a scene file mean their pictures to have, by the
     /// cameras' names.
     pub picture_sizes: Vec<(String, [u32; 2])>,
+    /// What moves in it, or could, in the order of the file.
+    pub animations: Vec<Animation>,
+    /// Frames a second: what the scene file says, else 24.
+    pub frames_per_second: f64,
 }
 
 /// Suffixes of the files that [`read_scene`] reads.
@@ -126,12 +143,17 @@ pub const SCENE_SUFFIXES: &[&str] = &[
 /// # Errors
 /// When the file cannot be read, is damaged, or needs what is not supported. Never panics.
 pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
-    let read = || {
+    read_with(path, options, &mut Models::default())
+}
+
+/// [`read_scene`] where models may have been read before.
+fn read_with(path: &Path, options: &ReadOptions, models: &mut Models) -> Result<Loaded, ReadError> {
+    let mut read = || {
         #[cfg(feature = "toml")]
         if scene_file::is_scene_file(path) {
-            return scene_file::read(path, options);
+            return scene_file::read(path, options, models);
         }
-        read_model(path, options)
+        models.read(path, options)
     };
     read().map_err(|error| match error.problem {
         Problem::Unreadable(ref system) if system.kind() == io::ErrorKind::NotFound => {
@@ -150,13 +172,20 @@ pub fn read_scene(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadErro
 fn read_model(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
     let mut warnings = Warnings::new(path.to_owned());
     let mut budget = Budget::new();
-    let scene = read(path, options, &mut budget, &mut warnings);
+    let mut animations = Vec::new();
+    let scene = read(path, options, &mut animations, &mut budget, &mut warnings);
+    if animations.is_empty() && options.moment != Moment::Rest {
+        let message = "has no animations, and stands at rest at any time";
+        warnings.add(Place::Whole, message);
+    }
     Ok(Loaded {
         scene: scene.map_err(|fault| fault.of(path))?,
         warnings: warnings.finish(),
         files: budget.files.finish(),
         default_camera: None,
         picture_sizes: Vec::new(),
+        animations,
+        frames_per_second: USUAL_FRAMES_PER_SECOND,
     })
 }
 
@@ -226,6 +255,7 @@ impl Format {
 fn read(
     path: &Path,
     options: &ReadOptions,
+    animations: &mut Vec<Animation>,
     budget: &mut Budget,
     warnings: &mut Warnings,
 ) -> Result<Scene, Fault> {
@@ -240,7 +270,15 @@ fn read(
     budget.add_input(bytes.len());
     let mut scene = match format {
         #[cfg(feature = "gltf")]
-        Format::Gltf => gltf::read(path, &bytes, budget, warnings)?,
+        Format::Gltf => {
+            let seconds = options.moment.seconds(USUAL_FRAMES_PER_SECOND);
+            let played = seconds.map(|seconds| gltf::Played {
+                name: options.animation.as_deref(),
+                seconds,
+                repeats: options.repeats,
+            });
+            gltf::read(path, &bytes, played, animations, budget, warnings)?
+        }
         #[cfg(feature = "obj")]
         Format::Obj => obj::read(path, &bytes, budget, warnings)?,
         #[cfg(feature = "ply")]

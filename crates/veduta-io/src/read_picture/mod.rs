@@ -71,6 +71,10 @@ pub enum PictureProblem {
     #[cfg(feature = "exr")]
     #[error("{0}")]
     Depth(crate::depth_picture::DepthProblem),
+    /// A picture that is read as a guest of a composite cannot be one.
+    #[cfg(feature = "exr")]
+    #[error("{0}")]
+    Guest(crate::guest::GuestProblem),
     /// More pixels than a file of that length can honestly hold, or than fit in memory.
     #[error(
         "says that it has {width} x {height} pixels, too many for {input} bytes; it is damaged"

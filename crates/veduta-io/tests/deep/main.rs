@@ -4,6 +4,7 @@
 mod damaged;
 mod depth_pictures;
 mod files;
+mod guests;
 mod merging;
 mod scenes;
 

@@ -1,5 +1,6 @@
 //! What the readers make of files: sound ones, wrong ones, damaged ones and real ones.
 
+mod animation;
 mod casters;
 mod cityjson;
 #[cfg(feature = "meshopt")]

@@ -4,7 +4,7 @@
 
 use crate::damaged::{Random, check, damage};
 use crate::scene_file::{CITY, SOUND, folder, read};
-use crate::support::Folder;
+use crate::support::{Folder, Glb};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -15,8 +15,11 @@ use veduta_io::{Problem, ReadError, scene_file_schema};
 fn rich() -> Value {
     json!({
         "world": { "crs": "EPSG:7415", "origin": [1, 2, 3.5], "vertical_datum": "NAP" },
+        "animation": { "fps": 25 },
         "camera": {
-            "a": { "eye": [0, -4, 1], "look_at": [0, 0, 0], "up": [0, 0, 1], "fov": "40deg",
+            "a": { "keys": [{ "time": 0, "eye": [0, -4, 1] },
+                    { "time": "2 s", "look_at": [0, 0, 1] }], "interpolation": "ease",
+                "eye": [0, -4, 1], "look_at": [0, 0, 0], "up": [0, 0, 1], "fov": "40deg",
                 "shift": [0, 0.25], "near": "1 cm", "size": [640, 480] },
             "b": { "eye": [0, 0, 9], "look_at": [0, 0, 0], "focal_length": "35 mm",
                 "sensor_height": "24 mm" },
@@ -30,6 +33,12 @@ fn rich() -> Value {
                 "at": { "matrix": [[1, 0, 0, 5], [0, 1, 0, 6], [0, 0, 1, 7]] } },
             { "name": "three", "model": "inner.toml", "at": { "scale": 0.5 } },
             { "name": "four", "model": "c.city.json", "lod": "2.2" },
+            { "name": "five", "model": "m.glb", "animation": "walk", "repeat": true,
+                "interpolation": "step", "keys": [
+                    { "time": 0.5, "translate": [1, 2, 3] },
+                    { "time": "36 frames", "rotate": { "axis": [0, 0, 1], "angle": "30deg" } },
+                    { "time": "2 s", "scale": 2 },
+                ] },
         ],
         "material": {
             "one/red": { "color": "#b5523b", "opacity": 0.5, "unlit": true, "double_sided": false,
@@ -47,6 +56,9 @@ fn rich_folder() -> Folder {
     );
     folder.write("inner.toml", SOUND);
     folder.write("c.city.json", CITY);
+    let mut glb = Glb::triangle();
+    glb.json["animations"] = json!([{ "name": "walk" }]);
+    folder.write("m.glb", glb.bytes());
     folder
 }
 
@@ -219,7 +231,7 @@ fn the_schema_accepts_the_examples_and_all_keys_that_there_are() {
     assert!(schema.is_valid(&document));
     let loaded = read(&rich_folder(), &toml_of(&document));
     let loaded = loaded.unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(loaded.scene.layers.len(), 4, "{:?}", loaded.warnings);
+    assert_eq!(loaded.scene.layers.len(), 5, "{:?}", loaded.warnings);
     // No key was forgotten here.
     let (mut known, mut used) = (BTreeSet::new(), BTreeSet::new());
     add_properties(&scene_file_schema(), &mut known);

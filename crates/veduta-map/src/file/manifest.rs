@@ -2,7 +2,7 @@
 
 use super::FileError;
 use crate::scene::{Layer, Light, Material, World};
-use crate::{Camera, Reading, Source};
+use crate::{Camera, GuestGrid, GuestKind, Reading, Source};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -28,6 +28,10 @@ pub struct Manifest {
     pub generator: String,
     /// Pixels of the picture it was made for; a map has no resolution.
     pub size: [u32; 2],
+    /// Whether something was cut or left out, so that a face may be unseen where nothing hides it; since
+    /// version 1.1.
+    #[serde(default)]
+    pub has_holes: bool,
     pub camera: Camera,
     pub world: World,
     pub layers: Vec<Layer>,
@@ -41,11 +45,24 @@ pub struct Manifest {
     /// What casts shadows; since version 1.1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub casters: Option<CastersTold>,
+    /// Pictures of other programs; since version 1.1.
+    #[serde(default)]
+    pub guests: Vec<GuestEntry>,
     /// Boxes around what the tiles' faces show: left, top, right, bottom, in the image plane. Tile `i`
     /// is batch `i` of the members that are cut into tiles.
     pub tiles: Vec<[f64; 4]>,
     /// Of each member that holds a table, by name.
     pub tables: BTreeMap<String, Table>,
+}
+
+/// What the tables do not tell of a guest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GuestEntry {
+    pub name: String,
+    pub kind: GuestKind,
+    pub grid: GuestGrid,
+    /// Names of what its samples belong to.
+    pub objects: Vec<String>,
 }
 
 /// What casts, as far as it is not in tables.

@@ -5,6 +5,7 @@
 //!
 //! - `casters` keeps, where that is asked for, what the map does not show but what casts shadows.
 //! - `spans` is what multiscan found, in a file of another kind: in place of regions.
+//! - `guests` are pictures of other programs.
 //! - `tables` are the columns; `tiles` says which rows stand together, so that a window of the picture
 //!   reads little; `container` is the archive, `manifest` what else there is to know.
 //! - Every byte is under a checksum, or is compared with its only legal value, before it is decoded:
@@ -16,6 +17,7 @@
 
 mod casters;
 mod container;
+mod guests;
 mod manifest;
 mod message;
 mod read;

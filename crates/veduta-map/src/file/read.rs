@@ -3,14 +3,15 @@
 use super::FileError;
 use super::casters;
 use super::container::{ArchiveReader, Member};
+use super::guests;
 use super::manifest::{MANIFEST, Manifest, SPANS_FORMAT, Segment, Table};
 use super::message;
 use super::spans;
 use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
 use crate::scene::{Mesh, MeshId, Object, Scene};
 use crate::{
-    Camera, FaceId, Faces, Fragments, MaterialId, ObjectId, PlaneId, Reading, SeenScene, SeenSpans,
-    Side, Source, VisibilityMap,
+    Camera, FaceId, Faces, Fragments, Guest, GuestSamples, MaterialId, ObjectId, PlaneId, Reading,
+    SeenScene, SeenSpans, Side, Source, VisibilityMap,
 };
 use arrow_array::RecordBatch;
 use arrow_ipc::MetadataVersion;
@@ -20,6 +21,9 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::sync::Arc;
 use veduta_geometry::{Affine, DVec2};
+
+/// All heights of the image plane.
+const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Reads a file, all of it or what a window needs.
 #[derive(Debug)]
@@ -72,6 +76,15 @@ impl<R: Read + Seek> MapReader<R> {
             if is_of_tiles && found.batches.len() != self.manifest.tiles.len() {
                 return unsound(format!("{name} does not have a batch for each tile"));
             }
+            let of_guests = TableName::OF_GUESTS.map(TableName::member).contains(&name);
+            let bands = self
+                .manifest
+                .guests
+                .iter()
+                .map(|guest| guests::band_count(&guest.grid));
+            if of_guests && found.batches.len() as u64 != bands.sum::<u64>() {
+                return unsound(format!("{name} does not have a batch for each band"));
+            }
         }
         if self.manifest.sub_scanlines.is_some() != (self.manifest.format == SPANS_FORMAT) {
             return unsound("it is of spans and not of spans".into());
@@ -92,6 +105,9 @@ impl<R: Read + Seek> MapReader<R> {
         names.extend([TableName::Objects, TableName::Images]);
         let mut names: Vec<_> = names.into_iter().map(TableName::member).collect();
         names.extend(is_of_spans.then_some(spans::MEMBER));
+        if !self.manifest.guests.is_empty() {
+            names.extend(TableName::OF_GUESTS.map(TableName::member));
+        }
         if self.has_embedded_casters() {
             names.extend(casters::members());
         }
@@ -164,12 +180,12 @@ impl<R: Read + Seek> MapReader<R> {
     /// [`FileError`].
     pub fn read(&mut self) -> Result<SeenScene, FileError> {
         self.refuse_spans()?;
-        self.read_tiles(0..self.manifest.tiles.len())
+        self.read_tiles(0..self.manifest.tiles.len(), EVERYWHERE)
     }
 
     /// Reads the faces of a file of spans, as a map of which nothing is seen.
     pub(super) fn read_faces(&mut self) -> Result<SeenScene, FileError> {
-        self.read_tiles(0..self.manifest.tiles.len())
+        self.read_tiles(0..self.manifest.tiles.len(), EVERYWHERE)
     }
 
     fn refuse_spans(&self) -> Result<(), FileError> {
@@ -195,9 +211,14 @@ impl<R: Read + Seek> MapReader<R> {
         let tiles: Vec<usize> = (0..self.manifest.tiles.len())
             .filter(|&tile| touches(&self.manifest.tiles[tile]))
             .collect();
-        let seen = self.read_tiles(tiles.into_iter())?;
-        // Objects and materials of which nothing was read are left out.
-        Ok(SeenScene::of(&seen.scene, &seen.map, seen.size))
+        let seen = self.read_tiles(tiles.into_iter(), [min.y, max.y])?;
+        // Objects and materials of which nothing was read are left out. In the window the map has the
+        // holes that the whole has.
+        Ok(SeenScene {
+            has_holes: seen.has_holes,
+            guests: seen.guests,
+            ..SeenScene::of(&seen.scene, &seen.map, seen.size)
+        })
     }
 
     /// Reads every byte and checks the invariants of what is read.
@@ -236,7 +257,12 @@ impl<R: Read + Seek> MapReader<R> {
         Ok(())
     }
 
-    fn read_tiles(&mut self, tiles: impl Iterator<Item = usize>) -> Result<SeenScene, FileError> {
+    /// Reads tiles, and guests between two heights of the image plane.
+    fn read_tiles(
+        &mut self,
+        tiles: impl Iterator<Item = usize>,
+        heights: [f64; 2],
+    ) -> Result<SeenScene, FileError> {
         let mut rows = SeenRows::default();
         let mut of_tiles = Vec::new();
         for &table in self.of_tiles() {
@@ -284,7 +310,48 @@ impl<R: Read + Seek> MapReader<R> {
             Ok(())
         })?;
         check_scene(&scene)?;
-        rows.into_seen(scene, &self.manifest)
+        let guests = self.read_guests(heights)?;
+        Ok(SeenScene {
+            guests,
+            ..rows.into_seen(scene, &self.manifest)?
+        })
+    }
+
+    /// Reads the bands of guests between two heights of the image plane. Guests of which that is nothing
+    /// are left out.
+    fn read_guests(&mut self, heights: [f64; 2]) -> Result<Vec<Guest>, FileError> {
+        let entries = self.manifest.guests.clone();
+        if entries.is_empty() {
+            return Ok(Vec::new());
+        }
+        let [of_pixels, of_samples] = [
+            TableReader::new(self, TableName::GuestPixels.member())?,
+            TableReader::new(self, TableName::GuestSamples.member())?,
+        ];
+        let mut guests = Vec::new();
+        let mut first_band = 0;
+        for entry in entries {
+            let bands = guests::band_count(&entry.grid) as usize;
+            if let Some((rows, of_guest)) = guests::bands_between(&entry.grid, heights) {
+                let mut samples = GuestSamples::default();
+                for band in of_guest {
+                    let index = first_band + band;
+                    let batches = [
+                        of_pixels.batch(self, index)?,
+                        of_samples.batch(self, index)?,
+                    ];
+                    let rows = [0, 1].map(|table| Rows {
+                        batch: &batches[table],
+                        member: TableName::OF_GUESTS[table].member(),
+                        index,
+                    });
+                    guests::add_band(&mut samples, &entry.grid, band, &rows)?;
+                }
+                guests.push(guests::guest(entry, rows, samples)?);
+            }
+            first_band += bands;
+        }
+        Ok(guests)
     }
 
     /// Reads a table, batch by batch.
@@ -501,6 +568,8 @@ impl SeenRows {
             },
             scene,
             size: manifest.size,
+            has_holes: manifest.has_holes,
+            guests: Vec::new(),
         })
     }
 

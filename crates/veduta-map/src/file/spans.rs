@@ -71,7 +71,9 @@ impl<R: Read + Seek> MapReader<R> {
                 expected: "spans of multiscan",
             });
         };
-        let SeenScene { map, scene, size } = self.read_faces()?;
+        let SeenScene {
+            map, scene, size, ..
+        } = self.read_faces()?;
         let [width, height] = size;
         let unsound = |what: String| FileError::unsound(MEMBER, what);
         let lines = u64::from(per_row) * u64::from(height) + 1;

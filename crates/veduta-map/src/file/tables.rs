@@ -33,9 +33,15 @@ pub enum TableName {
     Objects,
     /// Pictures, each a batch.
     Images,
+    /// How many samples the pixels of guests have, by band; only in files with guests.
+    GuestPixels,
+    /// Samples of guests, by band; only in files with guests.
+    GuestSamples,
 }
 
-use TableName::{Faces, Images, Objects, Opaque, Points, Veils, Vertices};
+use TableName::{
+    Faces, GuestPixels, GuestSamples, Images, Objects, Opaque, Points, Veils, Vertices,
+};
 
 impl TableName {
     /// Tables whose batches are tiles, in the order in which they stand in a file.
@@ -43,6 +49,9 @@ impl TableName {
 
     /// Those of them that tell of faces; the others tell where these are seen.
     pub const OF_FACES: [Self; 3] = [Points, Vertices, Faces];
+
+    /// Tables whose batches are bands of guests.
+    pub const OF_GUESTS: [Self; 2] = [GuestPixels, GuestSamples];
 
     /// Name of the member.
     pub fn member(self) -> &'static str {
@@ -54,6 +63,8 @@ impl TableName {
             Veils => "veils.arrow",
             Objects => "objects.arrow",
             Images => "images.arrow",
+            GuestPixels => "guest_pixels.arrow",
+            GuestSamples => "guest_samples.arrow",
         }
     }
 
@@ -96,11 +107,19 @@ impl TableName {
                 number("height"),
                 Field::new("rgba", DataType::LargeBinary, false),
             ],
+            GuestPixels => vec![number("samples")],
+            GuestSamples => {
+                let full = |name: &str| Field::new(name, DataType::Float32, false);
+                let mut fields = vec![real("near"), real("far")];
+                fields.extend(["opacity", "r", "g", "b"].map(full));
+                fields.push(number("object"));
+                fields
+            }
         };
         Schema::new(fields)
     }
 
-    fn batch(self, columns: Vec<ArrayRef>) -> RecordBatch {
+    pub(super) fn batch(self, columns: Vec<ArrayRef>) -> RecordBatch {
         RecordBatch::try_new(Arc::new(self.schema()), columns)
             .expect("columns are as the schema says")
     }
@@ -400,6 +419,12 @@ impl Rows<'_> {
         if column.values().iter().any(|value| !value.is_finite()) {
             return Err(self.unsound(format_args!("a number in `{name}` is not finite")));
         }
+        Ok(column.values())
+    }
+
+    /// Numbers of single precision.
+    pub fn floats(&self, name: &str) -> Result<&[f32], FileError> {
+        let column = self.full(name, |column| column.as_primitive_opt::<Float32Type>())?;
         Ok(column.values())
     }
 

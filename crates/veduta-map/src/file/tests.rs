@@ -2,11 +2,12 @@ use super::*;
 use crate::VisibilityMap;
 use crate::scene::{
     AlphaMode, Image, ImageId, Layer, Light, LightKind, Material, Mesh, MeshId, Object, Scene,
-    TextureRef, World,
+    Shown, TextureRef, World,
 };
 use crate::{
-    Camera, Casters, Choice, FaceId, Faces, Fragments, MaterialId, ObjectId, Origin, Projection,
-    Reading, SeenScene, SeenSpans, Side, Source, Span, SpanBand, Spans,
+    Camera, Casters, Choice, FaceId, Faces, Fragments, Guest, GuestGrid, GuestKind, GuestSamples,
+    MaterialId, ObjectId, Origin, Projection, Reading, SeenScene, SeenSpans, Side, Source, Span,
+    SpanBand, Spans,
 };
 use std::io::{Cursor, Write};
 use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
@@ -93,6 +94,7 @@ fn scene(faces: u32) -> Scene {
         layers: vec![Layer {
             name: "a".into(),
             priority: 2,
+            shown: Shown::Matte,
             objects: 0..1,
         }],
         world: World {
@@ -151,7 +153,29 @@ pub(super) fn seen(faces: u32) -> SeenScene {
         opaque,
         veils,
     };
-    SeenScene::of(&scene, &map, [1920, 1080])
+    SeenScene {
+        has_holes: true,
+        guests: vec![guest("deep.exr", [4, 2]), guest("card.png", [2, 1])],
+        ..SeenScene::of(&scene, &map, [1920, 1080])
+    }
+}
+
+fn guest(name: &str, size: [u32; 2]) -> Guest {
+    let mut samples = GuestSamples::default();
+    for pixel in 0..size[0] * size[1] {
+        for k in 0..pixel % 3 {
+            let near = 1.0 / f64::from(pixel + k + 3);
+            samples.push([near, 0.5 * near], 0.25, [0.1, 0.2, k as f32], k % 2);
+        }
+        samples.end_pixel();
+    }
+    let grid = GuestGrid {
+        frame: [5, 80],
+        first: [-1, 2],
+        size,
+    };
+    let objects = vec!["a".into(), "bäume".into()];
+    Guest::new(name.into(), GuestKind::Deep, grid, samples, objects).expect("sound")
 }
 
 fn source(path: &str) -> Source {
@@ -262,7 +286,14 @@ fn read(bytes: &[u8]) -> Result<SeenScene, FileError> {
 #[test]
 fn what_is_unseen_is_left_out_and_the_rest_stays() {
     let seen = seen(20);
-    assert_eq!(SeenScene::of(&seen.scene, &seen.map, seen.size), seen);
+    assert_eq!(
+        SeenScene::of(&seen.scene, &seen.map, seen.size).map,
+        seen.map
+    );
+    assert_eq!(
+        SeenScene::of(&seen.scene, &seen.map, seen.size).scene,
+        seen.scene
+    );
     let names: Vec<_> = seen
         .scene
         .materials
@@ -493,6 +524,59 @@ fn every_cut_and_every_flipped_bit_of_a_small_file_is_an_error() {
             });
         }
     });
+}
+
+#[test]
+fn a_window_reads_the_bands_of_guests_that_lie_in_it() {
+    let seen = SeenScene {
+        guests: vec![guest("deep.exr", [5, 70]), guest("card.png", [3, 2])],
+        ..seen(6)
+    };
+    let bytes = written(&seen);
+    let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
+    // Rows 2 to 71 of 80 are the first guest's, rows 2 and 3 the second's.
+    let below = [DVec2::new(0.0, 0.85), DVec2::ONE];
+    let guests = reader.read_window(below).expect("sound").guests;
+    assert_eq!(guests.len(), 1);
+    let (found, whole) = (&guests[0], &seen.guests[0]);
+    assert_eq!(found.grid().first, [-1, 66], "its second band");
+    assert_eq!(found.grid().size, [5, 6]);
+    for pixel in 0..30 {
+        let [own, of_whole] = [found.samples_of(pixel), whole.samples_of(64 * 5 + pixel)];
+        assert_eq!(
+            found.samples().near[own.clone()],
+            whole.samples().near[of_whole.clone()]
+        );
+        assert_eq!(found.samples().color[own], whole.samples().color[of_whole]);
+    }
+    let whole = reader
+        .read_window([DVec2::ZERO, DVec2::ONE])
+        .expect("sound");
+    assert_eq!(whole.guests, seen.guests);
+}
+
+#[test]
+fn a_manifest_without_guests_holes_and_ways_to_be_shown_is_read() {
+    // What such a file lacks in its manifest.
+    let manifest = written(&SeenScene {
+        guests: Vec::new(),
+        has_holes: false,
+        ..seen(6)
+    });
+    let reader = MapReader::new(Cursor::new(&manifest)).expect("sound");
+    let mut told = serde_json::to_value(reader.manifest()).expect("JSON");
+    let fields = told.as_object_mut().expect("an object");
+    fields.remove("guests").expect("is there");
+    fields.remove("has_holes").expect("is there");
+    fields["version"] = serde_json::json!([1, 0]);
+    fields["layers"][0]
+        .as_object_mut()
+        .expect("a layer")
+        .remove("shown");
+    let text = serde_json::to_vec(&told).expect("JSON");
+    let found = manifest::Manifest::parse(&text).expect("read");
+    assert_eq!((found.guests.len(), found.has_holes), (0, false));
+    assert_eq!(found.layers[0].shown, Shown::Seen);
 }
 
 #[test]

@@ -3,12 +3,13 @@
 use super::FileError;
 use super::casters::write_casters;
 use super::container::ArchiveWriter;
+use super::guests;
 use super::manifest::{FORMAT, MANIFEST, Manifest, SPANS_FORMAT, Segment, Table, VERSION};
 use super::spans::write_span_table;
 use super::tables::{TableName, TileBatches, image_row, object_rows};
 use super::tiles::tiles;
 use crate::scene::Scene;
-use crate::{Origin, SeenScene, SeenSpans, Spans, VisibilityMap};
+use crate::{Guest, Origin, SeenScene, SeenSpans, Spans, VisibilityMap};
 use arrow_array::RecordBatch;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
 use arrow_ipc::{CompressionType, MetadataVersion};
@@ -35,7 +36,10 @@ pub fn write_map<W: Write + Seek>(
     seen: &SeenScene,
     origin: &Origin,
 ) -> Result<W, FileError> {
-    let regions = Regions::Fragments;
+    let regions = Regions::Fragments {
+        guests: &seen.guests,
+        has_holes: seen.has_holes,
+    };
     write_seen(out, &seen.map, &seen.scene, seen.size, &regions, origin)
 }
 
@@ -58,8 +62,11 @@ pub fn write_spans<W: Write + Seek>(
 
 /// How a file tells where faces are seen.
 enum Regions<'a> {
-    /// By the fragments of the map.
-    Fragments,
+    /// By the fragments of the map, and guests between them.
+    Fragments {
+        guests: &'a [Guest],
+        has_holes: bool,
+    },
     /// By spans; of the map only the faces count.
     Spans(&'a Spans),
 }
@@ -77,8 +84,12 @@ fn write_seen<W: Write + Seek>(
         writer.write(table.member(), &table.schema(), batches)
     };
     let tiles = tiles(map);
+    let (guests, has_holes) = match *regions {
+        Regions::Fragments { guests, has_holes } => (guests, has_holes),
+        Regions::Spans(_) => (&[][..], false),
+    };
     let (format, of_tiles, sub_scanlines) = match regions {
-        Regions::Fragments => (FORMAT, &TableName::OF_TILES[..], None),
+        Regions::Fragments { .. } => (FORMAT, &TableName::OF_TILES[..], None),
         Regions::Spans(spans) => {
             let per_row = spans.sub_scanlines_per_row();
             (SPANS_FORMAT, &TableName::OF_FACES[..], Some(per_row))
@@ -94,6 +105,15 @@ fn write_seen<W: Write + Seek>(
     let objects = scene.objects.chunks(OBJECTS_PER_BATCH);
     write(TableName::Objects, &mut objects.map(object_rows))?;
     write(TableName::Images, &mut scene.images.iter().map(image_row))?;
+    if !guests.is_empty() {
+        for table in TableName::OF_GUESTS {
+            let bands = guests.iter().flat_map(|guest| {
+                let bands = guests::bands(guest.grid());
+                bands.map(move |rows| guests::batch(table, guest, rows))
+            });
+            write(table, &mut { bands })?;
+        }
+    }
     if let Regions::Spans(spans) = regions {
         write_span_table(&mut writer, spans)?;
     }
@@ -106,12 +126,14 @@ fn write_seen<W: Write + Seek>(
         version: VERSION,
         generator: concat!("veduta ", env!("CARGO_PKG_VERSION")).into(),
         size,
+        has_holes,
         camera: map.camera,
         world: scene.world.clone(),
         layers: scene.layers.clone(),
         lights: scene.lights.clone(),
         materials: scene.materials.clone(),
         sources: origin.sources.clone(),
+        guests: guests.iter().map(guests::entry).collect(),
         sub_scanlines,
         casters,
         tiles: tiles.iter().map(|tile| tile.bounds).collect(),

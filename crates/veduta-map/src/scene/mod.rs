@@ -11,7 +11,7 @@ mod world;
 pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Image, Material, TexcoordSet, TextureRef, Wrap};
 pub use mesh::{Mesh, MeshError};
-pub use world::{Layer, World};
+pub use world::{Layer, Shown, World};
 
 use crate::{Camera, MaterialId, ObjectId};
 use serde::{Deserialize, Serialize};

@@ -26,11 +26,91 @@ pub struct Layer {
     /// Of coplanar faces of two layers those of the higher priority are seen. Layers stand in the
     /// scene in descending order of it.
     pub priority: i32,
+    /// What its objects give to a picture.
+    #[serde(default)]
+    pub shown: Shown,
     /// Its objects: rows of [`Scene::objects`](super::Scene::objects).
     pub objects: Range<u32>,
 }
 
+/// What the objects of a layer give to a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shown {
+    /// They are seen.
+    #[default]
+    Seen,
+    /// They hide what is behind them, whatever the opacity of their materials, and are not seen
+    /// themselves: the picture has a hole of their shape.
+    Matte,
+    /// They are not seen and hide nothing; they cast shadows.
+    CasterOnly,
+    /// As [`Shown::Matte`], but for the shadows that fall on them.
+    ShadowOnly,
+}
+
+impl Shown {
+    /// Whether objects take part in depth: they hide what is behind them.
+    pub fn hides(self) -> bool {
+        self != Self::CasterOnly
+    }
+
+    /// Whether objects have colour and opacity in pictures.
+    pub fn is_seen(self) -> bool {
+        self == Self::Seen
+    }
+}
+
 impl Scene {
+    /// What an object gives to a picture.
+    pub fn shown(&self, object: ObjectId) -> Shown {
+        self.layer_of(object)
+            .map_or(Shown::Seen, |layer| layer.shown)
+    }
+
+    /// Whether objects are seen, by [`ObjectId`]; `None` where all are.
+    pub fn are_seen(&self) -> Option<Vec<bool>> {
+        if self.layers.iter().all(|layer| layer.shown.is_seen()) {
+            return None;
+        }
+        let mut are_seen = vec![true; self.objects.len()];
+        for layer in self.layers.iter().filter(|layer| !layer.shown.is_seen()) {
+            are_seen[layer.objects.start as usize..layer.objects.end as usize].fill(false);
+        }
+        Some(are_seen)
+    }
+
+    /// Lets the objects that `wanted` accepts by their names give `shown` to a picture. Their layers are
+    /// divided where not all objects of one are shown alike.
+    pub fn show_as(&mut self, shown: Shown, wanted: impl Fn(&str) -> bool) {
+        let mut layers: Vec<Layer> = Vec::new();
+        for index in 0..self.objects.len() as u32 {
+            let object = ObjectId(index);
+            let of = self.layer_of(object);
+            let name = of.map_or("", |layer| layer.name.as_str());
+            let priority = of.map_or(0, |layer| layer.priority);
+            let shown = if wanted(&self.object(object).name) {
+                shown
+            } else {
+                self.shown(object)
+            };
+            match layers.last_mut() {
+                Some(last)
+                    if (&*last.name, last.priority, last.shown) == (name, priority, shown) =>
+                {
+                    last.objects.end = index + 1;
+                }
+                _ => layers.push(Layer {
+                    name: name.into(),
+                    priority,
+                    shown,
+                    objects: index..index + 1,
+                }),
+            }
+        }
+        self.layers = layers;
+    }
+
     /// The layer of an object, if it is of one.
     pub fn layer_of(&self, object: ObjectId) -> Option<&Layer> {
         // Layers stand in the order of their objects.
@@ -61,7 +141,9 @@ impl Scene {
         self.keep_rows(&kept);
     }
 
-    fn keep_rows(&mut self, kept: &[bool]) {
+    /// Leaves out all objects but those whose row is `kept`. All else stays as it is, layers without
+    /// objects too.
+    pub fn keep_rows(&mut self, kept: &[bool]) {
         // How many stay before each object.
         let mut before = vec![0; kept.len() + 1];
         for (index, &is_kept) in kept.iter().enumerate() {
@@ -83,8 +165,7 @@ mod tests {
     use crate::scene::MeshId;
     use veduta_geometry::DMat4;
 
-    #[test]
-    fn kept_layers_keep_their_objects() {
+    fn scene() -> Scene {
         let mut scene = Scene::default();
         for name in ["free", "a/0", "a/1", "b/0", "c/0"] {
             scene.objects.push(Object {
@@ -97,9 +178,36 @@ mod tests {
             scene.layers.push(Layer {
                 name: name.into(),
                 priority: 0,
+                shown: Shown::Seen,
                 objects,
             });
         }
+        scene
+    }
+
+    #[test]
+    fn objects_shown_as_mattes_are_not_seen_and_the_others_are() {
+        let mut scene = scene();
+        assert_eq!(scene.are_seen(), None);
+        let keys = |scene: &Scene| -> Vec<_> {
+            let objects = (0..5).map(ObjectId);
+            let key = |object| scene.key_of(object);
+            objects
+                .map(|o| (key(o).0, key(o).1.to_owned(), key(o).2.to_owned()))
+                .collect()
+        };
+        let before = keys(&scene);
+        scene.show_as(Shown::Matte, |name| ["free", "a/1"].contains(&name));
+        assert_eq!(scene.are_seen(), Some(vec![false, true, false, true, true]));
+        assert_eq!(scene.shown(ObjectId(2)), Shown::Matte);
+        assert_eq!(keys(&scene), before, "depth ties are decided as before");
+        scene.show_as(Shown::Seen, |_| true);
+        assert_eq!(scene.are_seen(), None);
+    }
+
+    #[test]
+    fn kept_layers_keep_their_objects() {
+        let mut scene = scene();
         scene.keep_layers(|layer| layer.name != "b");
         let names: Vec<_> = scene.objects.iter().map(|o| o.name.as_str()).collect();
         assert_eq!(names, ["free", "a/0", "a/1", "c/0"]);

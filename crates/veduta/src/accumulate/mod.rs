@@ -17,7 +17,7 @@ pub use deep::{DeepFilter, DeepRows, DeepSample};
 pub use kernel_filter::{KernelFilter, KernelSums};
 pub use matte::{Matte, Rank, rank};
 
-use crate::dice::Parts;
+use crate::dice::{GuestLight, Parts};
 use crate::shade::Radiance;
 
 /// A picture in linear light: RGBA, colour premultiplied by opacity, rows from the top.
@@ -68,6 +68,16 @@ fn add_runs(parts: &Parts, radiance: &Radiance, sums: &mut [[f64; 4]]) {
                     add(sum, [r, g, b, 1.0].map(f64::from));
                 }
             }
+        }
+    }
+}
+
+/// Adds what is seen of guests to `pixels`, a band's rows.
+pub fn add_guests(light: &[GuestLight], pixels: &mut [[f32; 4]]) {
+    for of_pixel in light {
+        let pixel = &mut pixels[of_pixel.pixel as usize];
+        for (channel, more) in pixel.iter_mut().zip(of_pixel.light) {
+            *channel = (f64::from(*channel) + more) as f32;
         }
     }
 }

@@ -15,7 +15,7 @@ pub(crate) const LANES: usize = 8;
 /// The faces that are not guessed to be hidden in a cell, for every cell.
 ///
 /// Columns in cell order, so that a cell's extents are read as a stream; the bounds that `overlaps`
-/// compares are stored, and no more. Veils hide nothing and are not listed.
+/// compares are stored, and no more. Veils hide nothing: they are listed only on demand.
 pub(crate) struct CellLists {
     start: Vec<u32>,
     face: Vec<u32>,
@@ -97,7 +97,7 @@ pub(crate) fn listed_of_maps(
             let mut chunk = Chunk::default();
             for (face, extent) in range.clone().zip(&extents[range]) {
                 let face = FaceId::from_index(face);
-                if !wanted(face) || faces.is_veil(face) {
+                if !wanted(face) {
                     continue;
                 }
                 grid.each_row(faces.outline(face), extent, |row, columns| {

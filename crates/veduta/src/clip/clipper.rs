@@ -142,6 +142,56 @@ impl<'a> Clipper<'a> {
     }
 }
 
+impl Clipper<'_> {
+    /// Takes from `self.pieces`, which are of `face`, what the faces of `list` cover, nearer or not, and
+    /// adds it to `taken`.
+    pub fn subtract_covered(
+        &mut self,
+        face: FaceId,
+        list: &CellLists,
+        taken: &mut Vec<Vec<Corner>>,
+    ) {
+        let Self {
+            context,
+            pieces,
+            compared_with,
+            ..
+        } = self;
+        let Context {
+            faces,
+            extents,
+            grid,
+        } = *context;
+        let outline = faces.outline(face);
+        // Behind all, so that nothing is passed over for its depth.
+        let extent = Extent {
+            nearness: [f32::NEG_INFINITY; 2],
+            ..extents[face.index()].clone()
+        };
+        let stamp = face.0 + 1;
+        grid.each_row(outline, &extent, |row, columns| {
+            for column in columns {
+                list.overlapping(grid.index(column, row), &extent, None, |cover| {
+                    if compared_with[cover.index()] == stamp {
+                        return true;
+                    }
+                    compared_with[cover.index()] = stamp;
+                    let other = faces.outline(cover);
+                    let sides = Sides::group(other, 0);
+                    pieces.subtract_and_tell(cover, other, &sides, Depth::InFront, |piece| {
+                        taken.push(piece.iter().map(|measured| measured.corner).collect());
+                    });
+                    !pieces.is_empty()
+                });
+                if pieces.is_empty() {
+                    return false;
+                }
+            }
+            true
+        });
+    }
+}
+
 /// A face that may be hidden, made ready to be compared with many others.
 struct Occludee<'a> {
     face: FaceId,

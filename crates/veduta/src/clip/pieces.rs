@@ -21,8 +21,8 @@ pub(crate) struct Corner {
 
 /// A corner of the piece that is being cut, with its distances from the cutting lines.
 #[derive(Clone, Copy)]
-struct Measured {
-    corner: Corner,
+pub(crate) struct Measured {
+    pub corner: Corner,
     distance: [f64; LANES],
 }
 
@@ -120,6 +120,18 @@ impl Pieces {
     /// Takes away the part that `occluder` hides. `sides` are those of its outline (the first four
     /// of them).
     pub fn subtract(&mut self, occluder: FaceId, outline: &[DVec2], sides: &Sides, depth: Depth) {
+        self.subtract_and_tell(occluder, outline, sides, depth, |_| {});
+    }
+
+    /// [`Pieces::subtract`]; `taken` is told each piece that is taken away.
+    pub fn subtract_and_tell(
+        &mut self,
+        occluder: FaceId,
+        outline: &[DVec2],
+        sides: &Sides,
+        depth: Depth,
+        mut taken: impl FnMut(&[Measured]),
+    ) {
         debug_assert!(depth != Depth::Behind);
         let (mut min, mut max) = (outline[0], outline[0]);
         for &point in &outline[1..] {
@@ -141,6 +153,8 @@ impl Pieces {
         for piece in pieces.drain(first..) {
             if apart(&piece) || !self.cut_away(&piece, occluder, outline, sides, depth) {
                 self.next.push(piece);
+            } else {
+                taken(&self.overlap[0]);
             }
         }
         pieces.append(&mut self.next);

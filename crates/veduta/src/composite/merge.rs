@@ -12,7 +12,8 @@ use veduta_map::{FaceId, Faces, Fragment, Fragments, Seen};
 /// What is left of a face in its map is clipped by the faces *seen* in the others, and by all of each:
 /// where such a face is hidden in its own map, something nearer hides this one too. So the lines that
 /// cut are the very lines that would have cut if all had been found together, which corners of
-/// fragments, rounded as they are, would miss.
+/// fragments, rounded as they are, would miss. Maps with holes, where that is not so, come as faces that
+/// are their fragments (`pieced`).
 pub fn merge(faces: &Faces, maps: &[Seen], aspect: f64) -> Seen {
     Meeting::of(faces, maps, aspect).merge(faces)
 }
@@ -31,7 +32,7 @@ pub(super) struct Meeting<'a> {
 
 /// Where the fragments of a face are.
 #[derive(Clone, Copy)]
-struct Row {
+pub(super) struct Row {
     /// [`Row::NO_MAP`] for a face of which nothing is seen.
     map: u32,
     /// Of the map's opaque fragments, or of its veils.
@@ -51,12 +52,38 @@ impl Row {
         meets: false,
     };
 
-    fn is_seen(&self) -> bool {
+    pub fn is_seen(&self) -> bool {
         self.map != Self::NO_MAP
     }
 
     fn fragments(&self) -> Range<usize> {
         self.first as usize..(self.first + self.count) as usize
+    }
+
+    /// What was found of `face`, whose row this is, in its map; a fragment without corners is all of the
+    /// face.
+    pub fn corners(
+        &self,
+        faces: &Faces,
+        face: FaceId,
+        maps: &[Seen],
+    ) -> impl Iterator<Item = impl ExactSizeIterator<Item = Corner>> {
+        let seen = &maps[self.map as usize];
+        let fragments = if faces.is_veil(face) {
+            &seen.veils
+        } else {
+            &seen.opaque
+        };
+        self.fragments().map(|index| {
+            let (vertices, sides) = match fragments.get(index) {
+                Fragment::Whole(_) => (&[][..], &[][..]),
+                Fragment::Cut {
+                    vertices, sides, ..
+                } => (vertices, sides),
+            };
+            let both = vertices.iter().zip(sides);
+            both.map(|(&point, &side)| Corner { point, side })
+        })
     }
 }
 
@@ -125,7 +152,7 @@ impl<'a> Meeting<'a> {
         let row = |face: FaceId| &self.rows[face.index()];
         let lists = listed_of_maps(
             &context,
-            |face| row(face).meets,
+            |face| row(face).meets && !faces.is_veil(face),
             &self.meets,
             |face| row(face).map,
         );
@@ -137,7 +164,7 @@ impl<'a> Meeting<'a> {
         let mut clip = |seen: &[FaceId]| {
             let piles = clip_each(&context, seen, |clipper, (), face, pile| {
                 let row = row(face);
-                clipper.resume(face, self.fragments(faces, face));
+                clipper.resume(face, row.corners(faces, face, self.maps));
                 if row.meets {
                     clipper.subtract_others(face, &lists, row.map);
                 }
@@ -149,35 +176,10 @@ impl<'a> Meeting<'a> {
         clip(&apart);
         found.into_seen(faces)
     }
-
-    /// What was found of a face in its map; a fragment without corners is all of the face.
-    fn fragments(
-        &self,
-        faces: &Faces,
-        face: FaceId,
-    ) -> impl Iterator<Item = impl ExactSizeIterator<Item = Corner>> {
-        let row = &self.rows[face.index()];
-        let seen = &self.maps[row.map as usize];
-        let fragments = if faces.is_veil(face) {
-            &seen.veils
-        } else {
-            &seen.opaque
-        };
-        row.fragments().map(|index| {
-            let (vertices, sides) = match fragments.get(index) {
-                Fragment::Whole(_) => (&[][..], &[][..]),
-                Fragment::Cut {
-                    vertices, sides, ..
-                } => (vertices, sides),
-            };
-            let both = vertices.iter().zip(sides);
-            both.map(|(&point, &side)| Corner { point, side })
-        })
-    }
 }
 
 /// Where the fragments of each face are.
-fn rows(faces: &Faces, maps: &[Seen]) -> Vec<Row> {
+pub(super) fn rows(faces: &Faces, maps: &[Seen]) -> Vec<Row> {
     let mut rows = vec![Row::UNSEEN; faces.len()];
     for (map, seen) in (0..).zip(maps) {
         let mut add = |fragments: &Fragments, veils: bool| {

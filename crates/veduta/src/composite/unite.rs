@@ -1,15 +1,16 @@
-use super::merge::Meeting;
+use super::merge::{Meeting, merge};
+use super::pieced::Pieced;
 use crate::scene::{FaceIndex, PlaneGroups};
 use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::ops::Range;
 use veduta_geometry::DMat4;
 use veduta_map::scene::{
-    Image, ImageId, Layer, Material, Mesh, MeshId, Object, ObjectKey, Scene, World,
+    Image, ImageId, Layer, Material, Mesh, MeshId, Object, ObjectKey, Scene, Shown, World,
 };
 use veduta_map::{
-    Camera, FaceId, Faces, MaterialId, ObjectId, ObjectMesh, PlaneId, Projection, Seen, SeenScene,
-    VisibilityMap,
+    Camera, FaceId, Faces, Guest, MaterialId, ObjectId, ObjectMesh, PlaneId, Projection, Seen,
+    SeenScene, VisibilityMap,
 };
 
 /// Why maps cannot be composited.
@@ -35,6 +36,14 @@ pub enum CompositeError {
         /// In what they differ.
         difference: String,
     },
+    /// Pictures of other programs have no region that could cut a map or lie behind one.
+    #[error(
+        "map {index} holds pictures of other programs, which only hide by depth and are hidden by it"
+    )]
+    Guests {
+        /// Which of the maps.
+        index: usize,
+    },
     /// Spans meet on common sub-scanlines only.
     #[error("picture {index} was sampled otherwise than the first: {difference}")]
     OtherSampling {
@@ -47,7 +56,7 @@ pub enum CompositeError {
 
 /// What is seen of all maps together: composite(A, B, …) is the map of A and B and …
 ///
-/// Camera and size are the first map's, lights those of all maps.
+/// Camera and size are the first map's, lights and guests those of all maps.
 ///
 /// # Errors
 /// [`CompositeError`] for maps of different cameras or places in the world.
@@ -56,64 +65,142 @@ pub fn composite(maps: &[SeenScene]) -> Result<SeenScene, CompositeError> {
 }
 
 /// [`composite`] of `maps` as far as the surfaces of `holdouts` do not hide them. Where those are seen
-/// nothing is: the picture has a hole of their exact shape.
+/// nothing is: the picture has a hole of their exact shape. Where there are guests, what holds out
+/// stays in the map as a matte, since guests find what hides them when pixels are made.
 ///
 /// # Errors
-/// As [`composite`]; indices count the maps first, then the holdouts.
+/// As [`composite`]; indices count the maps first, then the holdouts, which may have no guests.
 pub fn hold_out(maps: &[SeenScene], holdouts: &[SeenScene]) -> Result<SeenScene, CompositeError> {
-    let shown = maps.len();
-    let maps: Vec<&SeenScene> = maps.iter().chain(holdouts).collect();
-    let first = maps.first().ok_or(CompositeError::Nothing)?;
-    let views = maps.iter();
-    refuse_other_views(views.map(|seen| (&seen.map.camera, &seen.scene.world)))?;
-    let scenes: Vec<&Scene> = maps.iter().map(|seen| &seen.scene).collect();
-    let united = UnitedScenes::of(&scenes);
-    let tables: Vec<&Faces> = maps.iter().map(|seen| &seen.map.faces).collect();
-    let (mut faces, new_ids) = united.faces(&tables);
-    let seen: Vec<Seen> = maps
-        .iter()
-        .zip(&new_ids)
-        .map(|(seen, new_ids)| {
-            let new_id = |face: FaceId| new_ids[face.index()];
-            Seen {
-                opaque: seen.map.opaque.renumbered(new_id),
-                veils: seen.map.veils.renumbered(new_id),
-            }
-        })
-        .collect();
-    // What was clipped before a near plane is not known; it does not change what lies behind.
-    let nears = maps.iter().map(|seen| seen.map.camera.near);
-    let camera = Camera {
-        near: nears.fold(f64::INFINITY, f64::min),
-        ..first.map.camera
-    };
-    let mut meeting = Meeting::of(&faces, &seen, camera.aspect());
-    united.share_planes(&mut faces, &mut meeting);
+    refuse_guests(holdouts, maps.len())?;
+    let guests: Vec<Guest> = maps.iter().flat_map(|seen| seen.guests.clone()).collect();
+    if !(guests.is_empty() || holdouts.is_empty()) {
+        let mut all = [maps, holdouts].concat();
+        for holdout in &mut all[maps.len()..] {
+            holdout.scene.show_as(Shown::Matte, |_| true);
+        }
+        return composite(&all);
+    }
+    let mut union = Union::of(maps.iter().chain(holdouts))?;
     let Seen {
         mut opaque,
         mut veils,
-    } = meeting.merge(&faces);
-    if shown < maps.len() {
-        let mut is_shown = vec![false; faces.len()];
-        for face in new_ids[..shown].iter().flatten() {
+    } = union.merged();
+    if !holdouts.is_empty() {
+        let mut is_shown = vec![false; union.faces.len()];
+        for face in union.new_ids[..maps.len()].iter().flatten() {
             is_shown[face.index()] = true;
         }
         for fragments in [&mut opaque, &mut veils] {
             *fragments = fragments.selected(|face| is_shown[face.index()]);
         }
     }
-    let map = VisibilityMap {
-        camera,
-        faces,
-        opaque,
-        veils,
-    };
-    Ok(SeenScene::of_meshes(
-        &united.scene,
-        &united.meshes,
-        &map,
-        first.size,
-    ))
+    let has_holes = !holdouts.is_empty() || union.has_holes.contains(&true);
+    Ok(SeenScene {
+        guests,
+        ..union.into_seen(Seen { opaque, veils }, has_holes)
+    })
+}
+
+/// Fails for maps with guests, of which the first is number `first`.
+pub(super) fn refuse_guests<'a>(
+    maps: impl IntoIterator<Item = &'a SeenScene>,
+    first: usize,
+) -> Result<(), CompositeError> {
+    let mut maps = maps.into_iter();
+    match maps.position(|seen| !seen.guests.is_empty()) {
+        Some(index) => Err(CompositeError::Guests {
+            index: first + index,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Several maps with what is seen of their scenes, brought to one table of faces and one scene.
+pub(super) struct Union<'a> {
+    united: UnitedScenes<'a>,
+    pub camera: Camera,
+    pub faces: Faces,
+    /// What is seen in each map.
+    pub maps: Vec<Seen>,
+    /// Of each map, whether faces are unseen in it where nothing hides them.
+    pub has_holes: Vec<bool>,
+    /// Of each map, the new numbers of its faces.
+    pub new_ids: Vec<Vec<FaceId>>,
+    size: [u32; 2],
+}
+
+impl<'a> Union<'a> {
+    /// # Errors
+    /// [`CompositeError`] for none, or for maps of different cameras or places in the world.
+    pub fn of(maps: impl Iterator<Item = &'a SeenScene>) -> Result<Self, CompositeError> {
+        let maps: Vec<&SeenScene> = maps.collect();
+        check_alike(&maps)?;
+        let first = maps[0];
+        let scenes: Vec<&Scene> = maps.iter().map(|seen| &seen.scene).collect();
+        let united = UnitedScenes::of(&scenes);
+        let tables: Vec<&Faces> = maps.iter().map(|seen| &seen.map.faces).collect();
+        let (faces, new_ids) = united.faces(&tables);
+        let seen = maps.iter().zip(&new_ids).map(|(seen, new_ids)| {
+            let new_id = |face: FaceId| new_ids[face.index()];
+            Seen {
+                opaque: seen.map.opaque.renumbered(new_id),
+                veils: seen.map.veils.renumbered(new_id),
+            }
+        });
+        // What was clipped before a near plane is not known; it does not change what lies behind.
+        let nears = maps.iter().map(|seen| seen.map.camera.near);
+        let camera = Camera {
+            near: nears.fold(f64::INFINITY, f64::min),
+            ..first.map.camera
+        };
+        Ok(Self {
+            camera,
+            faces,
+            maps: seen.collect(),
+            has_holes: maps.iter().map(|seen| seen.has_holes).collect(),
+            new_ids,
+            size: first.size,
+            united,
+        })
+    }
+
+    /// What the maps show, as one scene; meshes stay with the maps.
+    pub fn scene(&self) -> &Scene {
+        &self.united.scene
+    }
+
+    /// What is seen of all maps together. Faces that meet in one plane share it from then on.
+    fn merged(&mut self) -> Seen {
+        let aspect = self.camera.aspect();
+        let mut meeting = Meeting::of(&self.faces, &self.maps, aspect);
+        self.united.share_planes(&mut self.faces, &mut meeting);
+        if !self.has_holes.contains(&true) {
+            return meeting.merge(&self.faces);
+        }
+        let pieced = Pieced::new(&self.faces, &self.maps, &self.has_holes);
+        pieced.put_together(&merge(&pieced.faces, &pieced.maps, aspect))
+    }
+
+    /// The union with `seen` in it.
+    pub fn into_seen(self, Seen { opaque, veils }: Seen, has_holes: bool) -> SeenScene {
+        let map = VisibilityMap {
+            camera: self.camera,
+            faces: self.faces,
+            opaque,
+            veils,
+        };
+        let UnitedScenes { scene, meshes, .. } = &self.united;
+        SeenScene {
+            has_holes,
+            ..SeenScene::of_meshes(scene, meshes, &map, self.size)
+        }
+    }
+}
+
+/// Fails for no maps, and for maps of different cameras or places in the world.
+pub(super) fn check_alike(maps: &[&SeenScene]) -> Result<(), CompositeError> {
+    let views = maps.iter();
+    refuse_other_views(views.map(|seen| (&seen.map.camera, &seen.scene.world)))
 }
 
 /// Fails on the first view that cannot be composited with that before all.
@@ -253,13 +340,16 @@ impl<'a> UnitedScenes<'a> {
                 ..from.object(object).clone()
             });
             if has_layers {
+                let shown = from.shown(object);
+                let row = (layer, priority, shown);
                 match united.layers.last_mut() {
-                    Some(last) if last.name == layer && last.priority == priority => {
+                    Some(last) if (&*last.name, last.priority, last.shown) == row => {
                         last.objects.end = id.0 + 1;
                     }
                     _ => united.layers.push(Layer {
                         name: layer.into(),
                         priority,
+                        shown,
                         objects: id.0..id.0 + 1,
                     }),
                 }

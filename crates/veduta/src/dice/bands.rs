@@ -26,11 +26,38 @@ impl Bands {
         Self::overlapping(map, grid, BAND_ROWS, 0)
     }
 
+    /// The same for the fragments that `wanted` accepts.
+    pub fn of_fragments(
+        map: &VisibilityMap,
+        grid: PixelGrid,
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
+        let all = [0..grid.width, 0..grid.height];
+        Self::sorted(map, grid, [BAND_ROWS, 0], all, wanted)
+    }
+
+    /// The same for the fragments that may touch a pixel in these columns and rows. Other bands than
+    /// those of the rows have none.
+    pub fn within(map: &VisibilityMap, grid: PixelGrid, bounds: [Range<u32>; 2]) -> Self {
+        Self::sorted(map, grid, [BAND_ROWS, 0], bounds, |_| true)
+    }
+
     /// The same with bands that begin every `step` rows, each with `overlap` rows of those that follow.
     ///
     /// # Panics
     /// If `step` is 0, or the grid has no row beyond the overlap.
     pub fn overlapping(map: &VisibilityMap, grid: PixelGrid, step: u32, overlap: u32) -> Self {
+        let all = [0..grid.width, 0..grid.height];
+        Self::sorted(map, grid, [step, overlap], all, |_| true)
+    }
+
+    fn sorted(
+        map: &VisibilityMap,
+        grid: PixelGrid,
+        [step, overlap]: [u32; 2],
+        bounds: [Range<u32>; 2],
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Self {
         assert!(
             step > 0 && grid.height > overlap,
             "a band has rows of its own"
@@ -44,7 +71,10 @@ impl Bands {
             .into_par_iter()
             .with_min_len(1024)
             .map(|fragment| {
-                let Some([first, last]) = rows_touched(map, fragment, &grid) else {
+                let touched = wanted(fragment)
+                    .then(|| rows_touched(map, fragment, &grid, &bounds))
+                    .flatten();
+                let Some([first, last]) = touched else {
                     return 0..0;
                 };
                 first.saturating_sub(overlap) / step..(last / step + 1).min(count)
@@ -85,8 +115,14 @@ impl Bands {
     }
 }
 
-/// The first and the last row that the box around a fragment touches; none if it lies outside the grid.
-fn rows_touched(map: &VisibilityMap, fragment: usize, grid: &PixelGrid) -> Option<[u32; 2]> {
+/// The first and the last row in which the box around a fragment touches the columns and rows of
+/// `bounds`, which are some of the grid's; none if it does not.
+fn rows_touched(
+    map: &VisibilityMap,
+    fragment: usize,
+    grid: &PixelGrid,
+    [columns, rows]: &[Range<u32>; 2],
+) -> Option<[u32; 2]> {
     let polygon = map.polygon(map.fragment(fragment));
     let mut min = polygon[0];
     let mut max = polygon[0];
@@ -96,11 +132,12 @@ fn rows_touched(map: &VisibilityMap, fragment: usize, grid: &PixelGrid) -> Optio
     }
     let min = grid.pixels_from_image(min);
     let max = grid.pixels_from_image(max);
-    let (width, height) = (f64::from(grid.width), f64::from(grid.height));
-    if min.x >= width || max.x <= 0.0 || min.y >= height || max.y <= 0.0 {
+    let [left, right] = [columns.start, columns.end].map(f64::from);
+    let [top, bottom] = [rows.start, rows.end].map(f64::from);
+    if min.x >= right || max.x <= left || min.y >= bottom || max.y <= top {
         return None;
     }
-    let first = min.y.max(0.0) as u32;
-    let last = max.y.min(height - 1.0) as u32;
+    let first = min.y.max(top) as u32;
+    let last = max.y.min(bottom - 1.0) as u32;
     Some([first, last])
 }

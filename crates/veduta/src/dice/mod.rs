@@ -15,28 +15,35 @@
 //! 3. Where veils (faces that are not fully opaque) are seen, [`attenuate`] makes of each part's area what
 //!    is left of it behind the veils before it, once their opacities are known.
 //!
+//! [`GuestDicer`] does that where pictures of other programs are seen too, whose samples have depths.
+//!
 //! For filters that reach beyond a pixel the same is done on cells around it, with all moments of parts instead
 //! of areas ([`CellParts`], [`PixelGrid::between_centres`]).
 //!
 //! [`dice_spans`] does the same for what multiscan found. [`sum_by_face`] tells which faces a pixel
 //! shows, for all that is not light. [`coverage`] gives the areas in f64, for measuring; [`Depths`] how
-//! deep parts reach, for deep pictures.
+//! deep parts reach, for deep pictures. [`Region`] are the pixels that are made where only some are.
 
 mod bands;
 mod coverage;
 mod depth;
+mod guests;
 mod measure;
 mod pixel_grid;
 mod place;
+mod region;
 mod shares;
 mod spans;
+mod tidy;
 mod veils;
 
 pub use bands::{BAND_ROWS, Bands};
 pub use coverage::{Coverage, coverage};
 pub use depth::{DepthRange, Depths, depth_of_nearness};
+pub use guests::{GuestBuffers, GuestDicer, GuestLight};
 pub use measure::{CellParts, Diced, Measure};
 pub use pixel_grid::PixelGrid;
+pub use region::Region;
 pub use shares::{Share, largest, sum_by_face};
 pub use spans::{SpanDicer, dice_spans};
 pub use veils::{VeilBuffers, attenuate};

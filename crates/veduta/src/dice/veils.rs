@@ -405,7 +405,7 @@ fn part_before<M>(
 
 /// Smallest rectangle around a polygon.
 #[derive(Clone, Copy, Debug)]
-struct Extent {
+pub(super) struct Extent {
     min: DVec2,
     max: DVec2,
 }
@@ -443,7 +443,7 @@ impl Extent {
         start..points.len()
     }
 
-    fn of(polygon: &[DVec2]) -> Self {
+    pub fn of(polygon: &[DVec2]) -> Self {
         let (mut min, mut max) = (polygon[0], polygon[0]);
         for &point in &polygon[1..] {
             min = min.min(point);
@@ -466,7 +466,7 @@ impl Extent {
 
 /// Convex regions that do not overlap, each with a transmittance.
 #[derive(Clone, Debug, Default)]
-struct Regions {
+pub(super) struct Regions {
     regions: Vec<Region>,
     points: Vec<DVec2>,
     /// The regions as they will be, while they are cut.
@@ -487,7 +487,7 @@ struct Region {
 
 impl Regions {
     /// One region that lets all through; none for a polygon without area.
-    fn begin(&mut self, polygon: &[DVec2]) {
+    pub fn begin(&mut self, polygon: &[DVec2]) {
         self.regions.clear();
         self.points.clear();
         self.cut = false;
@@ -500,7 +500,7 @@ impl Regions {
     }
 
     /// The integral of the transmittance.
-    fn total<M: Measure>(&self) -> M {
+    pub fn total<M: Measure>(&self) -> M {
         let mut sum = M::default();
         for region in &self.regions {
             let corners = &self.points[region.start as usize..region.end as usize];
@@ -522,7 +522,7 @@ impl Regions {
 
     /// Puts a layer before all that follows, in `polygon`; returns the integral over it of the
     /// transmittance before the layer.
-    fn cut<M: Measure>(&mut self, polygon: &[DVec2], extent: &Extent, opacity: f64) -> M {
+    pub fn cut<M: Measure>(&mut self, polygon: &[DVec2], extent: &Extent, opacity: f64) -> M {
         let Self {
             regions,
             points,
@@ -623,7 +623,7 @@ fn separate(polygon: &[DVec2], other: &[DVec2]) -> bool {
 }
 
 /// What of a polygon lies where `distance`, an affine function, is not negative (Sutherland and Hodgman).
-fn keep(polygon: &[DVec2], distance: impl Fn(DVec2) -> f64, kept: &mut Vec<DVec2>) {
+pub(super) fn keep(polygon: &[DVec2], distance: impl Fn(DVec2) -> f64, kept: &mut Vec<DVec2>) {
     kept.clear();
     let Some(&last) = polygon.last() else {
         return;

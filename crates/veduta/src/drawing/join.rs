@@ -1,10 +1,10 @@
-use super::Look;
 use super::subdivision::Subdivision;
+use super::{Evenness, Joining, Look};
 use std::ops::Range;
 use veduta_geometry::{DVec2, signed_area};
 use veduta_map::{Camera, FaceId, Projection, VisibilityMap};
 
-/// Faces that are drawn as one: coplanar neighbours that look alike.
+/// Faces that are drawn as one, since they look alike.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Region {
     /// Ascending.
@@ -27,16 +27,22 @@ struct Seen {
 /// have to be alike too.
 const COPLANAR: f64 = 1e-5;
 
-/// How much the colours of flat faces in one plane may differ, as a share of the brightest channel: a
-/// quarter of a step of 8-bit sRGB. They differ by the rounding of normals.
-const SAME_COLOR: f32 = 2e-3;
+/// How much the colours of flat faces may differ, as a share of the brightest channel: less than half a step
+/// of 8-bit sRGB. Those of faces in one plane differ by the rounding of normals.
+const SAME_COLOR: f32 = 4e-3;
 
 /// Joins faces to regions; in the order of their first faces.
 ///
-/// Each region grows from its largest face over neighbours that lie in that face's plane and look like
-/// it. They are compared with this one face, not with one another: however long the chain, nothing
-/// drifts. A region may be seen in several places.
-pub(super) fn join(map: &VisibilityMap, subdivision: &Subdivision, looks: &[Look]) -> Vec<Region> {
+/// Each region grows from its largest face, by neighbours that lie in that face's plane and look like
+/// it, and if that is asked for by all others of its object that look like it. They are compared with this
+/// one face, not with one another: however long the chain, nothing drifts. A region may be seen in
+/// several places.
+pub(super) fn join(
+    map: &VisibilityMap,
+    subdivision: &Subdivision,
+    looks: &[Look],
+    joining: Joining,
+) -> Vec<Region> {
     let seen = seen_faces(map);
     let mut row_of_fragment = vec![0u32; map.opaque.len()];
     for (row, face) in seen.iter().enumerate() {
@@ -47,6 +53,8 @@ pub(super) fn join(map: &VisibilityMap, subdivision: &Subdivision, looks: &[Look
     let mut by_area: Vec<u32> = (0..seen.len() as u32).collect();
     by_area.sort_by(|&a, &b| seen[b as usize].area.total_cmp(&seen[a as usize].area));
 
+    let look_of = |row: u32| &looks[seen[row as usize].fragments.start as usize];
+    let alike = Alike::new(seen.len() as u32, look_of);
     let mut taken = vec![false; seen.len()];
     let mut regions = Vec::new();
     for first in by_area {
@@ -56,6 +64,13 @@ pub(super) fn join(map: &VisibilityMap, subdivision: &Subdivision, looks: &[Look
         let first = &seen[first as usize];
         let look = &looks[first.fragments.start as usize];
         let mut rows = vec![row_of_fragment[first.fragments.start as usize]];
+        if joining == Joining::Colors && look.evenness == Evenness::Even {
+            alike.each(look, look_of, |row| {
+                if !std::mem::replace(&mut taken[row as usize], true) {
+                    rows.push(row);
+                }
+            });
+        }
         let mut next = 0;
         while let Some(&row) = rows.get(next) {
             next += 1;
@@ -102,8 +117,48 @@ fn seen_faces(map: &VisibilityMap) -> Vec<Seen> {
     seen
 }
 
+/// Rows of seen faces, sorted to find those that look like one.
+struct Alike {
+    by_red: Vec<u32>,
+}
+
+impl Alike {
+    fn new<'a>(rows: u32, look_of: impl Fn(u32) -> &'a Look) -> Self {
+        let mut by_red: Vec<u32> = (0..rows).collect();
+        by_red.sort_by(|&a, &b| {
+            let [a, b] = [a, b].map(&look_of);
+            let by_object = a.object.cmp(&b.object);
+            by_object.then(a.radiance[0].total_cmp(&b.radiance[0]))
+        });
+        Self { by_red }
+    }
+
+    /// Visits the rows that look like `look`.
+    fn each<'a>(&self, look: &Look, look_of: impl Fn(u32) -> &'a Look, mut visit: impl FnMut(u32)) {
+        let least = look.radiance[0] - SAME_COLOR * brightest(look);
+        let start = self.by_red.partition_point(|&row| {
+            let other = look_of(row);
+            other.object < look.object || other.object == look.object && other.radiance[0] < least
+        });
+        let most = look.radiance[0] + SAME_COLOR * brightest(look);
+        for &row in &self.by_red[start..] {
+            let other = look_of(row);
+            if other.object != look.object || other.radiance[0] > most {
+                break;
+            }
+            if is_alike(look, other) {
+                visit(row);
+            }
+        }
+    }
+}
+
+fn brightest(look: &Look) -> f32 {
+    look.radiance.iter().copied().fold(0.0, f32::max)
+}
+
 fn is_alike(a: &Look, b: &Look) -> bool {
-    let brightest = a.radiance.iter().copied().fold(0.0, f32::max);
+    let brightest = brightest(a);
     let same_color = || {
         let channels = a.radiance.iter().zip(b.radiance);
         channels.fold(true, |same, (a, b)| {
@@ -111,11 +166,11 @@ fn is_alike(a: &Look, b: &Look) -> bool {
         })
     };
     (a.object, a.material, a.evenness) == (b.object, b.material, b.evenness)
-        && (a.evenness == super::Evenness::Picture || same_color())
+        && (a.evenness == Evenness::Picture || same_color())
 }
 
 /// Whether `face` lies in the plane of `first`.
-fn is_coplanar(map: &VisibilityMap, first: FaceId, face: FaceId) -> bool {
+pub(super) fn is_coplanar(map: &VisibilityMap, first: FaceId, face: FaceId) -> bool {
     let faces = &map.faces;
     let plane = faces.face_nearness(first);
     let difference = faces.face_nearness(face).minus(plane);

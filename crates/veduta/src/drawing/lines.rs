@@ -1,12 +1,12 @@
-//! Visible edges -> strokes.
+//! Edges -> strokes.
 //!
 //! Sides of fragments that lie between two faces are told apart by what the map knows: the planes on
-//! either side. Only for edges with a single face the mesh is asked. What is hidden is not in a map, so
-//! hidden lines are not drawn.
+//! either side. Only for edges with a single face the mesh is asked. What is hidden is in no fragment; that
+//! is looked for among all faces, by `hidden`.
 
 use super::join::depth_unit;
 use super::subdivision::{HalfEdge, Subdivision};
-use super::{COINCIDENT, LineKind, Settings, Stroke, is_on_frame, trace};
+use super::{COINCIDENT, LineKind, Settings, Stroke, hidden, is_on_frame, trace};
 use crate::dice::PixelGrid;
 use crate::scene::{Mesh, MeshId, Scene};
 use std::collections::HashMap;
@@ -17,7 +17,7 @@ use veduta_map::{Camera, FaceId, Projection, VisibilityMap};
 /// projection: of the frame's height), for them to be joined there: a tenth of a millimetre in a
 /// hundred metres. Larger joins what only lies close; smaller tears the corners of models whose points
 /// were rounded to single precision.
-const JOINED: f64 = 1e-6;
+pub(super) const JOINED: f64 = 1e-6;
 
 /// A piece of a side that is to be drawn.
 #[derive(Clone, Copy)]
@@ -27,7 +27,7 @@ struct Piece {
     to: u32,
 }
 
-/// The lines asked for, in order of kind.
+/// The lines asked for, in order of kind but hidden ones first: what is seen is drawn over them.
 ///
 /// A piece that is of several kinds becomes the first of them by [`LineKind`]'s order that is asked for.
 pub(super) fn strokes(
@@ -42,27 +42,49 @@ pub(super) fn strokes(
     }
     let judge = Judge::new(scene, map, subdivision, settings);
     let edges = subdivision.half_edges();
-    let mut pieces: Vec<Piece> = (0u32..)
-        .zip(edges)
-        .filter_map(|(index, edge)| {
-            let kind = judge.kind(index, edge)?;
-            Some(Piece {
-                kind,
-                from: edge.from,
-                to: edge.to,
-            })
-        })
-        .collect();
-    pieces.sort_by_key(|piece| piece.kind);
+    let seen = (0u32..).zip(edges).filter_map(|(index, edge)| {
+        let kind = judge.kind(index, edge)?;
+        Some((kind, subdivision.ends(index)))
+    });
+    let mut segments: Vec<(LineKind, [DVec2; 2])> = seen.collect();
+    if settings.lines.contains(&LineKind::Hidden) {
+        let hidden = hidden::segments(&judge, map);
+        segments.extend(hidden.into_iter().map(|ends| (LineKind::Hidden, ends)));
+    }
+    let (pieces, vertices) = each_once(&segments);
     let of_kinds = pieces.chunk_by(|a, b| a.kind == b.kind);
-    of_kinds
-        .flat_map(|pieces| chains(pieces, &subdivision.vertices, grid))
+    let mut strokes: Vec<Stroke> = of_kinds
+        .flat_map(|pieces| chains(pieces, &vertices, grid))
         .filter(|stroke| !stroke.points.is_empty())
-        .collect()
+        .collect();
+    strokes.sort_by_key(|stroke| stroke.kind != LineKind::Hidden);
+    strokes
+}
+
+/// How near to one another, in frame heights or widths, lines are one. Larger than the distance within which
+/// fragments are neighbours: where that fails, for a cut at a very flat angle, both would be drawn.
+const ONE_LINE: f64 = 1e-10;
+
+/// Cuts segments where they touch one another, so that what coincides has the same vertices, and keeps of each
+/// piece the first kind: what is seen goes before what is hidden. In order of kind.
+fn each_once(segments: &[(LineKind, [DVec2; 2])]) -> (Vec<Piece>, Vec<DVec2>) {
+    // As polygons of two corners, there and back.
+    let polygons: Vec<&[DVec2]> = segments.iter().map(|segment| &segment.1[..]).collect();
+    let cut = Subdivision::new(&polygons, ONE_LINE);
+    let mut pieces: Vec<Piece> = Vec::new();
+    for (index, &(kind, _)) in (0u32..).zip(segments) {
+        let edges = cut.around(index).map(|edge| *cut.half_edge(edge));
+        let forth = edges.filter(|edge| edge.from < edge.to);
+        pieces.extend(forth.map(|HalfEdge { from, to, .. }| Piece { kind, from, to }));
+    }
+    pieces.sort_by_key(|piece| (piece.from, piece.to, piece.kind));
+    pieces.dedup_by_key(|piece| (piece.from, piece.to));
+    pieces.sort_by_key(|piece| piece.kind);
+    (pieces, cut.vertices)
 }
 
 /// Says what kind of line a side is.
-struct Judge<'a> {
+pub(super) struct Judge<'a> {
     scene: &'a Scene,
     map: &'a VisibilityMap,
     subdivision: &'a Subdivision,
@@ -92,8 +114,14 @@ impl<'a> Judge<'a> {
         wanted.sort_unstable();
         let mut face_counts = HashMap::new();
         if wanted.contains(&LineKind::Boundary) {
-            for fragment in 0..map.opaque.len() {
-                let object = scene.object(map.faces.object(map.opaque.face(fragment)));
+            // Of all faces if what is hidden may be asked for.
+            let mut faces: Vec<FaceId> =
+                (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
+            if wanted.contains(&LineKind::Hidden) {
+                faces = map.faces.ids().collect();
+            }
+            for face in faces {
+                let object = scene.object(map.faces.object(face));
                 let mesh = &scene.meshes[object.mesh.0 as usize];
                 let counts = face_counts.entry(object.mesh);
                 counts.or_insert_with(|| FaceCounts::of(mesh));
@@ -107,6 +135,15 @@ impl<'a> Judge<'a> {
             crease_angle: settings.crease_angle,
             face_counts,
         }
+    }
+
+    pub fn wants(&self, kind: LineKind) -> bool {
+        self.wanted.contains(&kind)
+    }
+
+    /// Whether an edge between two faces at that angle is to be drawn.
+    pub fn is_crease(&self, angle: f64) -> bool {
+        self.wants(LineKind::Crease) && angle > self.crease_angle
     }
 
     /// The kind of a half-edge; `None` where no line is to be drawn, and for the second of twins.
@@ -153,7 +190,20 @@ impl<'a> Judge<'a> {
     }
 
     /// Whether the side lies on an edge of `face` that belongs to no other face of its mesh.
-    fn is_boundary(&self, face: FaceId, ends: [DVec2; 2]) -> bool {
+    pub fn is_boundary(&self, face: FaceId, ends: [DVec2; 2]) -> bool {
+        let mesh = self.scene.object(self.map.faces.object(face)).mesh;
+        self.edge_is(face, ends, |edge| {
+            self.face_counts[&mesh].of_edge(&self.scene.meshes[mesh.0 as usize], edge) == 1
+        })
+    }
+
+    /// Whether the side lies on an edge of `face`, and not on a cut.
+    pub fn is_edge(&self, face: FaceId, ends: [DVec2; 2]) -> bool {
+        self.edge_is(face, ends, |_| true)
+    }
+
+    /// Whether `is` says so of an edge of `face` on which the side lies.
+    fn edge_is(&self, face: FaceId, ends: [DVec2; 2], is: impl Fn([u32; 2]) -> bool) -> bool {
         let object = self.scene.object(self.map.faces.object(face));
         let mesh = &self.scene.meshes[object.mesh.0 as usize];
         let camera = &self.map.camera;
@@ -163,8 +213,7 @@ impl<'a> Judge<'a> {
             let edge = [corners[k], corners[(k + 1) % corners.len()]];
             let in_eye = edge
                 .map(|corner| eye_from_object.transform_point3(mesh.positions[corner as usize]));
-            ends.iter().all(|&end| is_on_edge(camera, in_eye, end))
-                && self.face_counts[&object.mesh].of_edge(mesh, edge) == 1
+            ends.iter().all(|&end| is_on_edge(camera, in_eye, end)) && is(edge)
         })
     }
 }
@@ -192,7 +241,7 @@ fn is_on_edge(camera: &Camera, [v0, v1]: [DVec3; 2], image: DVec2) -> bool {
 }
 
 /// Normal, in eye space and away from the eye, of the plane with that nearness.
-fn normal_of(camera: &Camera, plane: &Affine) -> DVec3 {
+pub(super) fn normal_of(camera: &Camera, plane: &Affine) -> DVec3 {
     // The inverse of [`Camera::nearness_of_plane`].
     let (scale, ahead) = (camera.image_scale(), camera.principal_point());
     let slope = DVec2::new(plane.a * scale.x, plane.b * scale.y);

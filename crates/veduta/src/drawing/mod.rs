@@ -8,14 +8,16 @@
 //!    on them (found by `near`), and from then on each piece knows who is across.
 //! 2. `join`: coplanar neighbours of one object that look alike become a region.
 //! 3. `trace`: what is left of the sides of its fragments closes to outlines and holes.
-//! 4. `order`: objects as a tree, painted far to near. Regions do not overlap, so any order would do;
-//!    this is the one that an illustrator expects.
+//! 4. `order`: objects as a tree, painted far to near, as an illustrator expects. Regions do not overlap, so
+//!    that any order would do; within an object thin shapes come first.
 //! 5. `trap`: against seams, a shape reaches a little under those painted later.
-//! 6. `lines`: visible edges as strokes.
+//! 6. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
+//! 7. `lines`: visible edges as strokes, and by `hidden` those that are not.
 //!
 //! Outlines are those of the map within 1e-12 of the frame. The result is the same for any number of
 //! threads.
 
+mod hidden;
 mod join;
 mod lines;
 mod near;
@@ -23,6 +25,7 @@ mod order;
 mod subdivision;
 mod trace;
 mod trap;
+mod veils;
 
 use crate::dice::PixelGrid;
 use crate::scene::{Material, Scene};
@@ -30,7 +33,7 @@ use join::Region;
 use rayon::prelude::*;
 use std::ops::Range;
 use subdivision::Subdivision;
-use trap::Trapper;
+use trap::{Reached, Trapper};
 use veduta_geometry::{DVec2, signed_area};
 use veduta_map::{Camera, MaterialId, ObjectId, Projection, VisibilityMap};
 
@@ -45,6 +48,8 @@ pub struct Look {
     pub radiance: [f32; 3],
     /// Whether it differs from point to point.
     pub evenness: Evenness,
+    /// How much it hides of what is behind, the mean where that differs: 1 for opaque faces.
+    pub opacity: f32,
 }
 
 /// Whether a face has one colour.
@@ -63,22 +68,25 @@ pub enum Evenness {
 pub struct Settings {
     /// How far, in pixels, shapes reach under those painted later; 0 for not at all.
     ///
-    /// Twice the diagonal of a viewer's pixel is enough: half of what is between a shape and
-    /// another that was painted earlier is left to that one. At full size that is 2.8 pixels.
+    /// The diagonal of a viewer's pixel and a quarter of a pixel is enough: 1.7 pixels at full size.
     pub trap: f64,
+    /// Which faces become one shape.
+    pub joining: Joining,
     /// Whether shapes are made.
     pub shapes: bool,
-    /// The lines to draw, if any.
+    /// The lines to draw, if any. [`LineKind::Hidden`] needs a map whose table has all faces of the scene,
+    /// which those that were stored have not.
     pub lines: Vec<LineKind>,
     /// The angle in radians between two faces above which their edge is a [`LineKind::Crease`].
     pub crease_angle: f64,
 }
 
 impl Default for Settings {
-    /// Shapes that reach 4 pixels under others, no lines; creases from 30 degrees.
+    /// Shapes of one colour that reach 2 pixels under others, no lines; creases from 30 degrees.
     fn default() -> Self {
         Self {
-            trap: 4.0,
+            trap: 2.0,
+            joining: Joining::Colors,
             shapes: true,
             lines: Vec::new(),
             crease_angle: 30f64.to_radians(),
@@ -86,7 +94,18 @@ impl Default for Settings {
     }
 }
 
-/// A visible edge, by what makes it one.
+/// Which faces become one shape, if they look alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Joining {
+    /// Neighbours in one plane.
+    Surfaces,
+    /// All of one object, wherever they are, if they have one colour ([`Evenness::Even`]); else
+    /// neighbours in one plane. Files become smaller, and there is nothing between neighbours of one
+    /// colour that could be seen.
+    Colors,
+}
+
+/// An edge, by what makes it one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LineKind {
     /// What is across is farther away, or nothing: the outline of something before something.
@@ -95,6 +114,9 @@ pub enum LineKind {
     Boundary,
     /// Two faces meet at an angle, along an edge or where they pierce each other.
     Crease,
+    /// An edge of one of the other kinds that are drawn, where it is hidden. (Where faces pierce each other
+    /// there is no edge.)
+    Hidden,
 }
 
 /// A vector picture: shapes and lines, in pixels of a picture of some size (x right, y down).
@@ -102,14 +124,27 @@ pub enum LineKind {
 pub struct Drawing {
     /// Width and height of the picture in pixels.
     pub size: [f64; 2],
+    /// What is painted before all shapes, so that nothing lighter or darker is seen between them.
+    pub underpainting: Option<Underpainting>,
     /// The tree of objects, parents before children, in the order in which they are painted.
     pub groups: Vec<Group>,
     /// In the order in which they are painted, which is that of their groups.
     pub shapes: Vec<Shape>,
-    /// In order of kind; painted last.
+    /// Shapes of faces that are not fully opaque, far to near; painted after all others.
+    pub veils: Vec<Veil>,
+    /// Painted last: hidden ones, then the others in order of kind.
     pub strokes: Vec<Stroke>,
     /// Names of the scene's materials, by [`MaterialId`].
     pub material_names: Vec<String>,
+}
+
+/// Most of what is covered, in one colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Underpainting {
+    /// Outlines and holes, wound as those of shapes are.
+    pub outlines: Vec<Vec<DVec2>>,
+    /// Mean radiance (linear Rec.709) of what lies on it.
+    pub radiance: [f32; 3],
 }
 
 /// A node of the tree of objects: one for each part of the objects' names between slashes.
@@ -149,7 +184,26 @@ pub struct Shape {
     pub farthest: f64,
 }
 
-/// A visible edge, as long as it goes on without a fork.
+/// A region of one look that is not fully opaque.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Veil {
+    /// The object.
+    pub object: ObjectId,
+    /// Its name.
+    pub name: String,
+    /// Its material.
+    pub material: MaterialId,
+    /// Radiance (linear Rec.709), not multiplied by the opacity; the mean if it is not even.
+    pub radiance: [f32; 3],
+    /// How much it hides of what is behind it: above 0, up to 1; the mean if it is not even.
+    pub opacity: f32,
+    /// Whether it really has one colour and opacity.
+    pub evenness: Evenness,
+    /// Outlines wound positively and holes the other way.
+    pub outlines: Vec<Vec<DVec2>>,
+}
+
+/// A line, as long as it goes on without a fork.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
     /// What makes it one.
@@ -165,7 +219,7 @@ pub struct Stroke {
 /// angles lose four of sixteen digits); more would be seen in areas, which are kept to 1e-9.
 const COINCIDENT: f64 = 1e-12;
 
-/// Draws what is seen: the fragments of `map` with the looks of each, in a picture of `grid`.
+/// Draws what is seen: the fragments of `map` with the looks of each, veils last, in a picture of `grid`.
 ///
 /// `scene` must be the one that the map was made of.
 ///
@@ -178,24 +232,52 @@ pub fn draw(
     grid: &PixelGrid,
     settings: &Settings,
 ) -> Drawing {
-    assert_eq!(looks.len(), map.opaque.len(), "a look for each fragment");
+    assert_eq!(
+        looks.len(),
+        map.fragment_count(),
+        "a look for each fragment"
+    );
+    let (looks, veil_looks) = looks.split_at(map.opaque.len());
     let polygons: Vec<&[DVec2]> = (0..looks.len() as u32)
         .map(|fragment| join::polygon_of(map, fragment))
         .collect();
     let subdivision = Subdivision::new(&polygons, COINCIDENT);
     let strokes = lines::strokes(scene, map, &subdivision, grid, settings);
     let (groups, shapes) = if settings.shapes {
-        shapes(scene, map, &subdivision, looks, grid, settings.trap)
+        shapes(scene, map, &subdivision, looks, grid, settings)
     } else {
         Default::default()
     };
+    let veils = if settings.shapes {
+        veils::veils(scene, map, veil_looks, grid)
+    } else {
+        Vec::new()
+    };
+    let has_traps = settings.trap > 0.0 && !shapes.is_empty();
     Drawing {
         size: [f64::from(grid.width), f64::from(grid.height)],
+        underpainting: has_traps.then(|| Underpainting {
+            outlines: trap::underpainting(&subdivision, grid),
+            radiance: mean_radiance(&shapes),
+        }),
         groups,
         shapes,
+        veils,
         strokes,
         material_names: names(&scene.materials),
     }
+}
+
+fn mean_radiance(shapes: &[Shape]) -> [f32; 3] {
+    let (mut area, mut sum) = (0.0, [0.0; 3]);
+    for shape in shapes {
+        let of_shape: f64 = shape.seen.iter().map(|outline| signed_area(outline)).sum();
+        area += of_shape;
+        for (sum, channel) in sum.iter_mut().zip(shape.radiance) {
+            *sum += of_shape * f64::from(channel);
+        }
+    }
+    sum.map(|sum| if area > 0.0 { (sum / area) as f32 } else { 0.0 })
 }
 
 fn names(materials: &[Material]) -> Vec<String> {
@@ -209,14 +291,28 @@ fn shapes(
     subdivision: &Subdivision,
     looks: &[Look],
     grid: &PixelGrid,
-    trap: f64,
+    settings: &Settings,
 ) -> (Vec<Group>, Vec<Shape>) {
-    let regions = join::join(map, subdivision, looks);
+    let regions = join::join(map, subdivision, looks, settings.joining);
+    let outlines: Vec<Outlines> = {
+        let mut region_of = vec![0u32; looks.len()];
+        for (index, region) in (0u32..).zip(&regions) {
+            for &fragment in &region.fragments {
+                region_of[fragment as usize] = index;
+            }
+        }
+        let of = |region| Outlines::of(subdivision, &region_of, region, grid);
+        regions.par_iter().map(of).collect()
+    };
+    let thickness: Vec<f64> = outlines
+        .iter()
+        .map(|outlines| trap::thickness(&outlines.seen))
+        .collect();
     let order::Painting {
         groups,
         order,
         group_of,
-    } = order::painting(scene, map, &regions);
+    } = order::painting(scene, map, &regions, &thickness);
     // When each fragment is painted.
     let mut rank = vec![0u32; looks.len()];
     for (place, &region) in (0u32..).zip(&order) {
@@ -224,73 +320,95 @@ fn shapes(
             rank[fragment as usize] = place;
         }
     }
-    let outlines: Vec<Outlines> = order
-        .par_iter()
-        .map(|&region| outlines(subdivision, &rank, &regions[region as usize], grid))
-        .collect();
-    for (outlines, &region) in outlines.iter().zip(&order) {
-        if outlines.is_unseen() {
-            for &fragment in &regions[region as usize].fragments {
-                rank[fragment as usize] = u32::MAX;
-            }
-        }
+    for fragment in outlines.iter().flat_map(|outlines| &outlines.unseen) {
+        rank[*fragment as usize] = u32::MAX;
     }
-    let trapper = Trapper::new(subdivision, &rank, grid, trap);
-    let shapes = outlines.into_par_iter().zip(&order).zip(&group_of);
-    let shapes = shapes.map(|((outlines, &region), &group)| {
-        let painted = if outlines.is_unseen() {
-            Vec::new()
-        } else {
-            trapper.with_trap(&outlines.loops, &outlines.seen)
-        };
+    let trapper = Trapper::new(subdivision, &rank, grid, settings.trap);
+    let shapes = order.par_iter().zip(&group_of);
+    let shapes = shapes.map_init(Reached::default, |reached, (&region, &group)| {
+        let outlines = &outlines[region as usize];
+        let painted = trapper.painted(&outlines.loops, reached);
         let region = &regions[region as usize];
-        shape(map, looks, region, group, outlines.seen, painted)
+        shape(map, looks, region, group, outlines.seen.clone(), painted)
     });
     (groups, shapes.collect())
 }
 
-/// Thickness in pixels of shapes that are not painted: they would change no pixel by a step of 8 bits.
+/// Thickness in pixels of what is not painted: it would change no pixel by a step of 8 bits.
 const UNSEEN: f64 = 1.0 / 256.0;
 
 /// The border of a region.
+#[derive(Default)]
 struct Outlines {
-    /// Of half-edges, each closed.
+    /// Of half-edges, each closed, around what is thick enough to be painted.
     loops: Vec<Vec<u32>>,
-    /// The corners of those that have an area, in pixels.
+    /// The fragments that are not.
+    unseen: Vec<u32>,
+    /// The corners of all loops that have an area, in pixels.
     seen: Vec<Vec<DVec2>>,
 }
 
 impl Outlines {
-    fn is_unseen(&self) -> bool {
-        trap::thickness(&self.seen) < UNSEEN
+    fn of(subdivision: &Subdivision, region_of: &[u32], region: &Region, grid: &PixelGrid) -> Self {
+        let mut outlines = Self::default();
+        for part in connected_parts(subdivision, region_of, region) {
+            let loops = trace::loops(subdivision, &border(subdivision, region_of, &part));
+            let corners = |edges: &Vec<u32>| {
+                let points: Vec<DVec2> = edges.iter().map(|&e| subdivision.ends(e)[0]).collect();
+                let corners = trace::corners(&points, COINCIDENT);
+                let in_pixels = |corner: usize| grid.pixels_from_image(points[corner]);
+                (!corners.is_empty()).then(|| corners.into_iter().map(in_pixels).collect())
+            };
+            let seen: Vec<Vec<DVec2>> = loops.iter().filter_map(corners).collect();
+            if trap::thickness(&seen) < UNSEEN {
+                outlines.unseen.extend(part);
+            } else {
+                outlines.loops.extend(loops);
+            }
+            outlines.seen.extend(seen);
+        }
+        outlines
     }
 }
 
-fn outlines(
-    subdivision: &Subdivision,
-    rank: &[u32],
-    region: &Region,
-    grid: &PixelGrid,
-) -> Outlines {
-    let loops = trace::loops(subdivision, &border(subdivision, rank, region));
-    let corners = |edges: &Vec<u32>| {
-        let points: Vec<DVec2> = edges.iter().map(|&e| subdivision.ends(e)[0]).collect();
-        let corners = trace::corners(&points, COINCIDENT);
-        let in_pixels = |corner: usize| grid.pixels_from_image(points[corner]);
-        (!corners.is_empty()).then(|| corners.into_iter().map(in_pixels).collect())
-    };
-    let seen = loops.iter().filter_map(corners).collect();
-    Outlines { loops, seen }
+/// The fragments of a region, by the parts in which it is seen.
+fn connected_parts(subdivision: &Subdivision, region_of: &[u32], region: &Region) -> Vec<Vec<u32>> {
+    let place = |fragment: u32| region.fragments.binary_search(&fragment);
+    let own = region_of[region.fragments[0] as usize];
+    let mut taken = vec![false; region.fragments.len()];
+    let mut parts = Vec::new();
+    for (first, &fragment) in region.fragments.iter().enumerate() {
+        if std::mem::replace(&mut taken[first], true) {
+            continue;
+        }
+        let mut part = vec![fragment];
+        let mut next = 0;
+        while let Some(&fragment) = part.get(next) {
+            next += 1;
+            let edges = subdivision.around(fragment);
+            for across in edges.filter_map(|edge| subdivision.across(edge)) {
+                if region_of[across as usize] == own
+                    && let Ok(place) = place(across)
+                    && !std::mem::replace(&mut taken[place], true)
+                {
+                    part.push(across);
+                }
+            }
+        }
+        part.sort_unstable();
+        parts.push(part);
+    }
+    parts
 }
 
-/// The half-edges between a region and others.
-fn border(subdivision: &Subdivision, rank: &[u32], region: &Region) -> Vec<u32> {
-    let own_rank = rank[region.fragments[0] as usize];
-    let edges = region.fragments.iter();
+/// The half-edges between a part of a region and what is not of the region.
+fn border(subdivision: &Subdivision, region_of: &[u32], fragments: &[u32]) -> Vec<u32> {
+    let own = region_of[fragments[0] as usize];
+    let edges = fragments.iter();
     let edges = edges.flat_map(|&fragment| subdivision.around(fragment));
     let is_border = |edge: &u32| {
         let across = subdivision.across(*edge);
-        across.is_none_or(|fragment| rank[fragment as usize] != own_rank)
+        across.is_none_or(|fragment| region_of[fragment as usize] != own)
     };
     edges.filter(is_border).collect()
 }

@@ -46,8 +46,13 @@ impl Mean {
 const MOST_LEVELS: usize = 64;
 
 /// Puts the objects' names into a tree, the farther of its branches first: by the mean nearness of what
-/// is seen.
-pub(super) fn painting(scene: &Scene, map: &VisibilityMap, regions: &[Region]) -> Painting {
+/// is seen. Of one object the thin regions come first.
+pub(super) fn painting(
+    scene: &Scene,
+    map: &VisibilityMap,
+    regions: &[Region],
+    thickness: &[f64],
+) -> Painting {
     let nearness: Vec<Mean> = regions.iter().map(|region| mean(map, region)).collect();
     let mut nodes = vec![Node::default()];
     for (index, region) in regions.iter().enumerate() {
@@ -84,11 +89,11 @@ pub(super) fn painting(scene: &Scene, map: &VisibilityMap, regions: &[Region]) -
         let own = (at != 0).then_some(painting.groups.len() as u32);
         if let Some(own) = own {
             let start = painting.order.len();
-            let mut far_to_near = node.regions.clone();
-            let key = |region: &u32| nearness[*region as usize].value();
-            far_to_near.sort_by(|a, b| key(a).total_cmp(&key(b)));
-            painting.group_of.extend(far_to_near.iter().map(|_| own));
-            painting.order.extend(far_to_near);
+            let mut thin_to_thick = node.regions.clone();
+            let key = |region: &u32| thickness[*region as usize];
+            thin_to_thick.sort_by(|a, b| key(a).total_cmp(&key(b)));
+            painting.group_of.extend(thin_to_thick.iter().map(|_| own));
+            painting.order.extend(thin_to_thick);
             painting.groups.push(Group {
                 name: node.name.to_owned(),
                 parent,

@@ -5,34 +5,41 @@
 //! painted first fills the pixel, the later one is laid on that and the pixel is right. Printers have the
 //! same trouble with inks out of register, and the same remedy, called a trap.
 //!
-//! A trap must stay hidden, at outer contours above all, or the picture grows fat by what peeps out from
-//! under thin shapes. So it consists of parts of the *fragments* of later shapes, which the map has:
+//! Where later shapes lie, the outline is free: it may run anywhere under them, so it runs where it has few
+//! corners. A stretch of border towards later shapes (a *chain*) is replaced by the border of a convex
+//! zone around it, as a wall goes on behind the trees before it:
 //!
 //! ```text
-//!     own shape                       zone of the side a-b: up to `width` away from it, on the far side,
-//!   ____a__________b____                ended at right angles, or halfway to the next side's zone;
-//!       :  f1 | f2 :      later       traps: what f1, f2, f3 … cover of the zone, as far as one gets
-//!       :_____|____:      shapes        from a-b through fragments of later shapes;
-//!       \ _ . - ' exit                less what is too near to an exit.
+//!        limit :  . - - - - - .  : limit           zone: the convex hull of the chain, `reach` more on
+//!              :.'  later      '.:                 the later side, between the limits;
+//!     ---------s\  /\  shapes  _ t---------        limit: the border before and after the chain, carried
+//!       own      \/  \__/\__/                      on, or a part of the way to where the later shapes
+//!       shape                                      end.
 //! ```
 //!
-//! Shapes thinner than [`super::UNSEEN`] are not painted, and all others reach under them as if they
-//! were painted last: however thin a shape is, it would be seen, since the edges of what lies on top of
-//! it let a quarter of it through.
+//! Nothing but the shape itself and later shapes may lie in the zone: elsewhere it would be seen. Fragments
+//! are searched from the chain outwards. If there is an *exit*, a side beyond which there is nothing or a
+//! shape painted earlier, the chain is cut in two, each with a zone of its own, up to its bisector. A single
+//! straight side tries smaller zones, and then does without.
 //!
-//! What is left: pixels in which three shapes meet may still let some of the background through (a few
-//! dozen in half a million of a city's picture), and a shape thinner than a pixel shows more of its colour
-//! between two others than its area would.
+//! A hole full of later shapes vanishes: its zone is its hull, and no outline is left.
 //!
-//! Beyond a sharp point of the shape, where zones at either side would leave a wedge open, lies one more.
+//! Thin shapes have exits at their other side. So within an object they are painted first, and reach under
+//! the thick ones. Shapes thinner than [`super::UNSEEN`] are not painted, and all others reach under them
+//! as if they were painted last: however thin a shape is, it would be seen, since the edges of what
+//! lies on top of it let a quarter of it through.
 //!
-//! An exit is a side beyond which there is nothing, or a shape painted earlier: where the trap would peep
-//! out. What is near to it is given up: nearer than half a pixel, and than a quarter of the distance from
-//! the own side.
+//! Where all fails there is the *underpainting*, as painters lay one on the bare canvas: all that is
+//! covered, a pixel within its border, in its mean colour. It shows where seams would be.
 
 use super::subdivision::Subdivision;
 use super::{is_on_frame, trace};
 use crate::dice::PixelGrid;
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::float::simplify::SimplifyShape;
+use i_overlay::mesh::float::outline::offset::OutlineOffset;
+use i_overlay::mesh::float::style::OutlineStyle;
+use std::f64::consts::{PI, TAU};
 use veduta_geometry::{Affine, DVec2, cross, signed_area};
 
 /// Makes traps; lengths are in pixels.
@@ -40,8 +47,18 @@ pub(super) struct Trapper<'a> {
     subdivision: &'a Subdivision,
     /// When each fragment is painted.
     rank: &'a [u32],
-    grid: &'a PixelGrid,
-    width: f64,
+    /// The vertices of the subdivision in pixels.
+    points: Vec<DVec2>,
+    reach: f64,
+}
+
+/// Which fragments a search has come to; kept from search to search.
+#[derive(Default)]
+pub(super) struct Reached {
+    /// The last search that came to each fragment.
+    by: Vec<u32>,
+    search: u32,
+    fragments: Vec<u32>,
 }
 
 /// Areas, in square pixels, that are not worth a trap.
@@ -56,6 +73,34 @@ const COINCIDENT: f64 = 1e-6;
 /// How far, in pixels, the sides of what is painted may be moved to make them straight: a tenth of the
 /// thousandth to which files are written. What is seen of shapes is not moved.
 const STRAIGHT: f64 = 1e-4;
+
+/// How near to an exit traps may come, in pixels. With more, traps would be missing in pixels that the
+/// exit does not touch; with less, thin shapes would look fat.
+const NEAR_EXIT: f64 = 0.25;
+
+/// How much of the angle between a chain and an exit at its end its zone leaves open.
+const NEAR_EXIT_SHARE: f64 = 0.25;
+
+/// How far within the border of what is covered the underpainting ends, in pixels. With less, outlines before
+/// the background would look fat; with more, seams would be seen farther from them.
+const INSET: f64 = 1.0;
+
+/// How far, in pixels, the outline of the underpainting may be moved to have fewer corners.
+const ROUGH: f64 = 0.25;
+
+/// The angle in radians that a border must turn by where a chain begins or ends, for its zone to end where
+/// the border would go on.
+const FLAT: f64 = 0.5;
+
+/// The length in pixels from which on a chain with an exit is worth cutting in two. Shorter ones lie between
+/// shapes of a few pixels, and there are many of them.
+const SHORT: f64 = 3.0;
+
+/// How far corners of zones may lie from what they surround, in reaches: sharper ones are cut off.
+const SHARPEST: f64 = 3.0;
+
+/// Most fragments that are searched for a zone before its chain is cut in two.
+const MOST_SEARCHED: usize = 20_000;
 
 /// Mean thickness of a shape: that of a long strip with the same area and border.
 pub(super) fn thickness(outlines: &[Vec<DVec2>]) -> f64 {
@@ -73,6 +118,42 @@ pub(super) fn thickness(outlines: &[Vec<DVec2>]) -> f64 {
     }
 }
 
+/// Outlines of all that is covered, [`INSET`] within its border.
+pub(super) fn underpainting(subdivision: &Subdivision, grid: &PixelGrid) -> Vec<Vec<DVec2>> {
+    let edges = 0..subdivision.half_edges().len() as u32;
+    let border: Vec<u32> = edges
+        .filter(|&edge| subdivision.across(edge).is_none())
+        .collect();
+    // At the frame it goes on to the frame.
+    let beyond = |point: DVec2| {
+        let on_frame = |at: f64| {
+            let is_at = |side: f64| f64::from((at - side).abs() <= 2.0 * super::COINCIDENT);
+            is_at(1.0) - is_at(0.0)
+        };
+        grid.pixels_from_image(point) + INSET * DVec2::new(on_frame(point.x), on_frame(point.y))
+    };
+    let loops = trace::loops(subdivision, &border);
+    let outlines: Vec<Vec<[f64; 2]>> = loops
+        .iter()
+        .map(|edges| {
+            let points = edges.iter().map(|&edge| beyond(subdivision.ends(edge)[0]));
+            points.map(|point| point.to_array()).collect()
+        })
+        .collect();
+    let style = OutlineStyle::new(-INSET);
+    // Loops may touch themselves in points.
+    let shapes = outlines.simplify_shape(FillRule::NonZero).outline(&style);
+    shapes
+        .into_iter()
+        .flatten()
+        .filter_map(|outline| {
+            let points: Vec<DVec2> = outline.into_iter().map(DVec2::from).collect();
+            let corners = trace::corners(&points, ROUGH);
+            (!corners.is_empty()).then(|| corners.into_iter().map(|c| points[c]).collect())
+        })
+        .collect()
+}
+
 /// A straight part of a shape's border, all of it towards later shapes, or none of it.
 struct Side {
     from: DVec2,
@@ -87,72 +168,67 @@ impl Side {
         !self.edges.is_empty()
     }
 
-    /// Whether the zones of two sides that follow one another meet halfway.
-    fn meets(&self, other: &Side) -> bool {
-        other.is_trapped() && self.along.dot(other.along) > SHARP
-    }
-
-    /// Where the shape comes to a point that is too sharp for the zones to meet: a side across it,
-    /// whose zone lies beyond the point.
-    fn cap(&self, after: &Side, width: f64) -> Option<Side> {
-        let is_tip = cross(self.along, after.along) > 0.0;
-        if !is_tip || !after.is_trapped() || self.meets(after) {
-            return None;
-        }
-        let out = (self.along - after.along).normalize_or_zero();
-        let along = out.perp();
-        Some(Side {
-            from: self.to - width * along,
-            along,
-            to: self.to + width * along,
-            edges: vec![self.edges[self.edges.len() - 1], after.edges[0]],
-        })
+    fn length(&self) -> f64 {
+        (self.to - self.from).length()
     }
 }
 
-/// The part of the plane for the trap of a side: where all of these are at least zero.
-struct Zone([Affine; 4]);
+/// Sides towards later shapes, one after the other.
+#[derive(Clone, Copy)]
+struct Chain<'a> {
+    sides: &'a [Side],
+    /// Where its zone ends: to the left of a line through its start, and to the right of one through its
+    /// end. None if it is closed.
+    limits: Option<[DVec2; 2]>,
+}
+
+impl Chain<'_> {
+    fn start(&self) -> DVec2 {
+        self.sides[0].from
+    }
+
+    fn end(&self) -> DVec2 {
+        self.sides[self.sides.len() - 1].to
+    }
+}
 
 impl<'a> Trapper<'a> {
     pub fn new(
         subdivision: &'a Subdivision,
         rank: &'a [u32],
-        grid: &'a PixelGrid,
-        width: f64,
+        grid: &PixelGrid,
+        reach: f64,
     ) -> Self {
+        let vertices = subdivision.vertices.iter();
         Self {
             subdivision,
             rank,
-            grid,
-            width,
+            points: vertices
+                .map(|&vertex| grid.pixels_from_image(vertex))
+                .collect(),
+            reach,
         }
     }
 
-    /// What is to be painted of the shape within `loops` of half-edges, whose corners are `seen`.
-    pub fn with_trap(&self, loops: &[Vec<u32>], seen: &[Vec<DVec2>]) -> Vec<Vec<DVec2>> {
-        let mut traps = Vec::new();
-        if self.width > 0.0 {
-            for edges in loops {
-                self.trap_loop(edges, &mut traps);
+    /// What is to be painted of the shape within `loops` of half-edges.
+    pub fn painted(&self, loops: &[Vec<u32>], reached: &mut Reached) -> Vec<Vec<DVec2>> {
+        reached.by.resize(self.rank.len(), 0);
+        let mut painted = Vec::new();
+        for edges in loops {
+            let mut outline = self.outline(edges, reached);
+            let is_repeated = |a: DVec2, b: DVec2| (a - b).length() <= COINCIDENT;
+            outline.dedup_by(|a, b| is_repeated(*a, *b));
+            while let [first, .., last] = outline[..]
+                && is_repeated(first, last)
+            {
+                outline.pop();
+            }
+            let corners = trace::corners(&outline, STRAIGHT);
+            if !corners.is_empty() {
+                painted.push(corners.into_iter().map(|c| outline[c]).collect());
             }
         }
-        if traps.is_empty() {
-            return seen.to_vec();
-        }
-        let polygons: Vec<&[DVec2]> = seen.iter().chain(&traps).map(Vec::as_slice).collect();
-        let union = Subdivision::new(&polygons, COINCIDENT);
-        let edges = 0..union.half_edges().len() as u32;
-        let border: Vec<u32> = edges
-            .filter(|&edge| union.half_edge(edge).twin.is_none())
-            .collect();
-        trace::loops(&union, &border)
-            .iter()
-            .filter_map(|edges| {
-                let points: Vec<DVec2> = edges.iter().map(|&e| union.ends(e)[0]).collect();
-                let corners = trace::corners(&points, STRAIGHT);
-                (!corners.is_empty()).then(|| corners.iter().map(|&c| points[c]).collect())
-            })
-            .collect()
+        painted
     }
 
     /// Whether what is across a half-edge is painted later.
@@ -166,22 +242,47 @@ impl<'a> Trapper<'a> {
     }
 
     fn pixels(&self, edge: u32) -> [DVec2; 2] {
-        let ends = self.subdivision.ends(edge);
-        ends.map(|point| self.grid.pixels_from_image(point))
+        let edge = self.subdivision.half_edge(edge);
+        [edge.from, edge.to].map(|vertex| self.points[vertex as usize])
     }
 
-    fn trap_loop(&self, edges: &[u32], traps: &mut Vec<Vec<DVec2>>) {
-        let sides = self.sides(edges);
-        for (index, side) in sides.iter().enumerate() {
-            if side.is_trapped() {
-                let before = &sides[(index + sides.len() - 1) % sides.len()];
-                let after = &sides[(index + 1) % sides.len()];
-                self.trap_side(side, &Zone::new(side, before, after, self.width), traps);
-                if let Some(cap) = side.cap(after, self.width) {
-                    self.trap_side(&cap, &Zone::new(&cap, &cap, &cap, self.width), traps);
-                }
-            }
+    /// The outline of a loop with its traps.
+    fn outline(&self, edges: &[u32], reached: &mut Reached) -> Vec<DVec2> {
+        let mut sides = self.sides(edges);
+        let mut outline = Vec::new();
+        if self.reach == 0.0 {
+            outline.extend(sides.iter().map(|side| side.from));
+            return outline;
         }
+        let Some(fixed) = sides.iter().position(|side| !side.is_trapped()) else {
+            let whole = Chain {
+                sides: &sides,
+                limits: None,
+            };
+            self.cover(whole, reached, &mut outline);
+            return outline;
+        };
+        // No chain goes on from the last side to the first.
+        sides.rotate_left(fixed);
+        let mut next = 0;
+        for run in sides.chunk_by(|a, b| a.is_trapped() == b.is_trapped()) {
+            let first = next;
+            next += run.len();
+            if !run[0].is_trapped() {
+                outline.extend(run.iter().flat_map(|side| [side.from, side.to]));
+                continue;
+            }
+            let limits = [
+                self.limit_at_start(&sides[first - 1], &run[0]),
+                self.limit_at_end(&run[run.len() - 1], &sides[next % sides.len()]),
+            ];
+            let chain = Chain {
+                sides: run,
+                limits: Some(limits),
+            };
+            self.cover(chain, reached, &mut outline);
+        }
+        outline
     }
 
     /// Cuts a loop where it turns, and where what is across begins or ends to be painted later.
@@ -222,57 +323,152 @@ impl<'a> Trapper<'a> {
         sides
     }
 
-    fn trap_side(&self, side: &Side, zone: &Zone, traps: &mut Vec<Vec<DVec2>>) {
-        let own_rank = self.own_rank(side.edges[0]);
-        let across = |&edge: &u32| self.subdivision.across(edge);
-        let mut reached: Vec<u32> = side.edges.iter().filter_map(across).collect();
-        reached.dedup();
-        let mut next = 0;
-        while let Some(&fragment) = reached.get(next) {
-            next += 1;
-            let edges = self.subdivision.around(fragment);
-            let mut part: Vec<DVec2> = edges.clone().map(|edge| self.pixels(edge)[0]).collect();
-            for half_plane in &zone.0 {
-                part = clipped(&part, half_plane);
+    /// The direction from the start of a chain in which its zone ends: the border before it carried on, or
+    /// three quarters of the way to where later shapes end, whichever is less far round.
+    fn limit_at_start(&self, before: &Side, first: &Side) -> DVec2 {
+        let exit = self.last_later(first.edges[0], first.from, false);
+        let angle_to = |direction: DVec2| angle(direction, first.along);
+        let turn = limit(angle_to(before.along), exit.map(angle_to));
+        DVec2::from_angle(-turn).rotate(first.along)
+    }
+
+    /// The same at the end of a chain.
+    fn limit_at_end(&self, last: &Side, after: &Side) -> DVec2 {
+        let exit = self.last_later(last.edges[last.edges.len() - 1], last.to, true);
+        let angle_to = |direction: DVec2| angle(-last.along, direction);
+        let turn = limit(angle_to(-after.along), exit.map(angle_to));
+        DVec2::from_angle(turn).rotate(-last.along)
+    }
+
+    /// Goes around an end of a half-edge of a chain, from what is across it through later fragments to
+    /// the last of them. The direction in which that one ends; `None` on the frame.
+    fn last_later(&self, edge: u32, pivot: DVec2, at_end: bool) -> Option<DVec2> {
+        let own_rank = self.own_rank(edge);
+        let mut twin = self.subdivision.half_edge(edge).twin?;
+        // A vertex has fewer fragments around it than there are.
+        for _ in 0..self.rank.len() {
+            let around = self
+                .subdivision
+                .around(self.subdivision.half_edge(twin).polygon);
+            let count = around.end - around.start;
+            let step = if at_end { count - 1 } else { 1 };
+            let side = around.start + (twin - around.start + step) % count;
+            if is_on_frame(self.subdivision.ends(side)) {
+                return None;
             }
-            // Far enough from all exits by share, and in pixels: together a little less than far enough
-            // from each by either, but convex.
-            let mut parts = [part.clone(), part];
-            let mut has_exit = false;
-            // However thin the part is, what lies beyond it may be reached through it.
-            for edge in edges {
-                let ends = self.pixels(edge);
-                if !zone.meets(ends) {
-                    continue;
+            match self.subdivision.half_edge(side).twin {
+                Some(next)
+                    if self.rank[self.subdivision.half_edge(next).polygon as usize] > own_rank =>
+                {
+                    twin = next;
                 }
-                let is_exit = match self.subdivision.across(edge) {
-                    // Beyond the frame there is no picture for a trap to be seen in.
-                    None => !is_on_frame(self.subdivision.ends(edge)),
-                    Some(across) if self.rank[across as usize] > own_rank => {
-                        if !reached.contains(&across) {
-                            reached.push(across);
-                        }
-                        false
-                    }
-                    Some(across) => self.rank[across as usize] < own_rank,
-                };
-                // Along the side itself no distance can be kept.
-                let is_along = ends
-                    .iter()
-                    .all(|&end| zone.0[0].at(end).abs() <= COINCIDENT);
-                if is_exit && !is_along {
-                    has_exit = true;
-                    for (part, far) in parts.iter_mut().zip(far_from_exit(side, ends)) {
-                        *part = clipped(part, &far);
-                    }
+                _ => {
+                    let [from, to] = self.pixels(side);
+                    let other = if at_end { from } else { to };
+                    return Some((other - pivot).normalize_or_zero());
                 }
             }
-            // Without exits both are the same.
-            let count = if has_exit { 2 } else { 1 };
-            let parts = parts.into_iter().take(count);
-            traps.extend(parts.filter(|part| signed_area(part) > NEGLIGIBLE_AREA));
+        }
+        None
+    }
+
+    /// Appends the outline of a chain's trap, without the chain's ends.
+    fn cover(&self, chain: Chain, reached: &mut Reached, outline: &mut Vec<DVec2>) {
+        let count = chain.sides.len();
+        // A single side may have a smaller trap.
+        let reaches: &[f64] = if count == 1 { &[1.0, 0.5] } else { &[1.0] };
+        for share in reaches {
+            let reach = share * self.reach;
+            if let Some(zone) = Zone::around(&chain, reach)
+                && self.is_free(&chain, &zone, NEAR_EXIT.min(0.5 * reach), reached)
+            {
+                outline.extend(&zone.outer);
+                return;
+            }
+        }
+        let length: f64 = chain.sides.iter().map(|side| side.length()).sum();
+        if count < 2 || length < SHORT {
+            outline.extend(chain.sides.iter().flat_map(|side| [side.from, side.to]));
+            return;
+        }
+        let (one, other) = chain.sides.split_at(count / 2);
+        let middle = between(&one[one.len() - 1], &other[0]);
+        let [start, end] = chain.limits.unwrap_or_else(|| {
+            let limit = between(&other[other.len() - 1], &one[0]);
+            [limit, limit]
+        });
+        for (sides, limits) in [(one, [start, middle]), (other, [middle, end])] {
+            let limits = Some(limits);
+            self.cover(Chain { sides, limits }, reached, outline);
         }
     }
+
+    /// Whether nothing but the chain's shape and later ones lies in a zone, and near to it.
+    fn is_free(&self, chain: &Chain, zone: &Zone, distance: f64, reached: &mut Reached) -> bool {
+        let own_rank = self.own_rank(chain.sides[0].edges[0]);
+        reached.begin();
+        for &edge in chain.sides.iter().flat_map(|side| &side.edges) {
+            reached.push(self.subdivision.half_edge(edge).polygon);
+            if let Some(across) = self.subdivision.across(edge) {
+                reached.push(across);
+            }
+        }
+        let mut next = 0;
+        while let Some(&fragment) = reached.fragments.get(next) {
+            next += 1;
+            if next > MOST_SEARCHED {
+                return false;
+            }
+            for edge in self.subdivision.around(fragment) {
+                if !zone.meets(self.pixels(edge), distance) {
+                    continue;
+                }
+                match self.subdivision.across(edge) {
+                    // Beyond the frame there is no picture for a trap to be seen in.
+                    None if is_on_frame(self.subdivision.ends(edge)) => {}
+                    Some(across) if self.rank[across as usize] >= own_rank => reached.push(across),
+                    _ => return false,
+                }
+            }
+        }
+        true
+    }
+}
+
+impl Reached {
+    fn begin(&mut self) {
+        self.search += 1;
+        self.fragments.clear();
+    }
+
+    fn push(&mut self, fragment: u32) {
+        let by = &mut self.by[fragment as usize];
+        if *by != self.search {
+            *by = self.search;
+            self.fragments.push(fragment);
+        }
+    }
+}
+
+/// The angle by which `from` is turned to `to`: 0 to 2π.
+fn angle(from: DVec2, to: DVec2) -> f64 {
+    let angle = cross(from, to).atan2(from.dot(to));
+    if angle < 0.0 { angle + TAU } else { angle }
+}
+
+/// How far round from a chain its zone reaches at its end: to the border carried on, and not as far as an
+/// exit.
+fn limit(border: f64, exit: Option<f64>) -> f64 {
+    let exit = exit.map_or(PI, |exit| (1.0 - NEAR_EXIT_SHARE) * exit);
+    // If the border hardly turns, what it leaves of the zone is too narrow.
+    let border = if border < FLAT { PI } else { border };
+    border.min(exit).min(PI)
+}
+
+/// The direction away from the shape where two of its sides meet, halfway between them.
+fn between(one: &Side, other: &Side) -> DVec2 {
+    let turn = cross(one.along, other.along).atan2(one.along.dot(other.along));
+    DVec2::from_angle(0.5 * turn).rotate(-one.along.perp())
 }
 
 /// Distance from the line through `point` along the unit vector `along`, positive on the side to
@@ -281,59 +477,103 @@ fn distance_from(point: DVec2, along: DVec2) -> Affine {
     Affine::new(-along.y, along.x, -cross(along, point))
 }
 
-/// How near to an exit traps may come: as a share of the distance from the side, and in pixels; the less
-/// of the two. With more, traps would be missing in pixels that the exit does not touch; with less, thin
-/// shapes would look fat.
-const NEAR_EXIT: (f64, f64) = (0.25, 0.5);
-
-/// Where a trap of the side keeps its distance from an exit, as a share and in pixels: where the functions
-/// are at least zero.
-fn far_from_exit(side: &Side, [from, to]: [DVec2; 2]) -> [Affine; 2] {
-    let from_side = distance_from(side.from, side.along);
-    let from_exit = distance_from(from, (to - from).normalize_or_zero());
-    let (share, pixels) = NEAR_EXIT;
-    [
-        // The distance from the side is negative where its trap lies.
-        Affine::new(
-            from_exit.a + share * from_side.a,
-            from_exit.b + share * from_side.b,
-            from_exit.c + share * from_side.c,
-        ),
-        Affine::new(from_exit.a, from_exit.b, from_exit.c - pixels),
-    ]
+/// The function `by` greater.
+fn raised(function: &Affine, by: f64) -> Affine {
+    Affine::new(function.a, function.b, function.c + by)
 }
 
-/// How sharply two sides may turn (the cosine) for their zones to meet halfway. Where they turn by more
-/// than 120 degrees, the corner would reach too far.
-const SHARP: f64 = -0.5;
+/// A convex part of the plane for the trap of a chain.
+struct Zone {
+    half_planes: Vec<HalfPlane>,
+    /// The part of its border that becomes the shape's outline, from the chain's start to its end.
+    outer: Vec<DVec2>,
+}
+
+/// One side of a line, or on it: where `inside` is at least zero, which is the distance from the line.
+#[derive(Clone, Copy)]
+struct HalfPlane {
+    inside: Affine,
+    kind: Border,
+}
+
+/// What lies along a border of a zone.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Border {
+    /// Later shapes; it may be moved outwards.
+    Free,
+    /// Later shapes.
+    Cap,
+    /// The shape, or the line at which the zone of the next chain begins.
+    Own,
+}
+
+/// A corner of a zone, and what lies along the side that starts there: a row of its half-planes.
+#[derive(Clone, Copy)]
+struct Corner {
+    at: DVec2,
+    side: usize,
+}
 
 impl Zone {
-    fn new(side: &Side, before: &Side, after: &Side, width: f64) -> Self {
-        let away = distance_from(side.from, side.along).negated();
-        let meeting = |neighbour: &Side| {
-            let across = if side.meets(neighbour) {
-                (side.along + neighbour.along).normalize_or_zero()
-            } else {
-                side.along
+    /// The zone of a chain; `None` if the chain winds so that it has none.
+    fn around(chain: &Chain, reach: f64) -> Option<Self> {
+        let mut points: Vec<DVec2> = chain.sides.iter().map(|side| side.from).collect();
+        if chain.limits.is_some() {
+            points.push(chain.end());
+        }
+        let mut half_planes = hull_half_planes(&points, chain.limits.is_none(), reach);
+        if let Some([at_start, at_end]) = chain.limits {
+            let limits = [
+                distance_from(chain.start(), at_start),
+                distance_from(chain.end(), at_end).negated(),
+            ];
+            let contains = |half_plane: &Affine| {
+                points
+                    .iter()
+                    .all(|&point| half_plane.at(point) >= -COINCIDENT)
             };
-            // Along `across`, from where they meet.
-            move |corner: DVec2| Affine::new(across.x, across.y, -across.dot(corner))
-        };
-        Self([
-            away,
-            Affine::new(-away.a, -away.b, width - away.c),
-            meeting(before)(side.from),
-            meeting(after)(side.to).negated(),
-        ])
+            if !limits.iter().all(contains) {
+                return None;
+            }
+            half_planes.extend(limits.map(|inside| HalfPlane {
+                inside,
+                kind: Border::Own,
+            }));
+            // No farther to the sides than the trap is deep and half of it.
+            let [first, last] = [&chain.sides[0], &chain.sides[chain.sides.len() - 1]];
+            let caps = [
+                distance_from(first.from, -first.along.perp()),
+                distance_from(last.to, last.along.perp()),
+            ];
+            let caps = caps.map(|cap| raised(&cap, 1.5 * reach));
+            let caps = caps.into_iter().filter(contains);
+            half_planes.extend(caps.map(|inside| HalfPlane {
+                inside,
+                kind: Border::Cap,
+            }));
+        }
+        half_planes.extend(frame_around(&points, 2.0 * SHARPEST * reach));
+        let corners = with_fewer_corners(corners_of(&half_planes)?, &half_planes, reach);
+        let outer = outer_border(&corners, &half_planes)?;
+        Some(Self {
+            half_planes: corners
+                .iter()
+                .map(|corner| half_planes[corner.side])
+                .collect(),
+            outer,
+        })
     }
 
-    /// Whether a part of a segment lies in the zone.
-    fn meets(&self, [from, to]: [DVec2; 2]) -> bool {
+    /// Whether a part of a segment lies in the zone, or within a distance of it under later shapes.
+    fn meets(&self, [from, to]: [DVec2; 2], distance: f64) -> bool {
         let mut part = [0.0, 1.0];
-        for (index, half_plane) in self.0.iter().enumerate() {
-            // A little more on the own side: what lies along it does so but for rounding.
-            let margin = if index == 0 { COINCIDENT } else { 0.0 };
-            let [start, end] = [from, to].map(|end| half_plane.at(end) + margin);
+        for half_plane in &self.half_planes {
+            // What lies along the shape or a limit lies outside but for rounding.
+            let margin = match half_plane.kind {
+                Border::Own => -COINCIDENT,
+                Border::Free | Border::Cap => distance,
+            };
+            let [start, end] = [from, to].map(|end| half_plane.inside.at(end) + margin);
             if start < 0.0 && end < 0.0 {
                 return false;
             }
@@ -350,18 +590,186 @@ impl Zone {
     }
 }
 
-/// The part of a convex polygon in which `half_plane` is at least zero (Sutherland & Hodgman, 1974).
-fn clipped(polygon: &[DVec2], half_plane: &Affine) -> Vec<DVec2> {
-    let mut part = Vec::with_capacity(polygon.len() + 1);
-    for (index, &here) in polygon.iter().enumerate() {
-        let there = polygon[(index + 1) % polygon.len()];
-        let (d_here, d_there) = (half_plane.at(here), half_plane.at(there));
-        if d_here >= 0.0 {
-            part.push(here);
-        }
-        if d_here < 0.0 && d_there > 0.0 || d_here > 0.0 && d_there < 0.0 {
-            part.push(here + (there - here) * (d_here / (d_here - d_there)));
+/// The half-planes of the hull of a chain's points, moved outwards by `reach` where later shapes lie.
+///
+/// Sides of the hull that run as the chain does have later shapes outside, the others the shape itself.
+fn hull_half_planes(points: &[DVec2], closed: bool, reach: f64) -> Vec<HalfPlane> {
+    let hull = hull(points);
+    let is_outline = signed_area(points) > 0.0;
+    let is_free = |from: usize, to: usize| if closed { is_outline } else { to > from };
+    let side = |k: usize| [hull[k % hull.len()], hull[(k + 1) % hull.len()]];
+    let mut half_planes = Vec::new();
+    for k in 0..hull.len() {
+        let [from, to] = side(k);
+        let along = (points[to] - points[from]).normalize_or_zero();
+        let free = is_free(from, to);
+        half_planes.push(HalfPlane {
+            inside: raised(
+                &distance_from(points[from], along),
+                if free { reach } else { 0.0 },
+            ),
+            kind: if free { Border::Free } else { Border::Own },
+        });
+        let [_, next] = side(k + 1);
+        let after = (points[next] - points[to]).normalize_or_zero();
+        // The corner lies one by the sine of half its angle away.
+        let is_sharp = (along - after).length() > 2.0 * (1.0 - SHARPEST.powi(-2)).sqrt();
+        if free && is_free(to, next) && is_sharp && hull.len() > 2 {
+            let tip = (along + after).normalize_or(along);
+            half_planes.push(HalfPlane {
+                inside: raised(&distance_from(points[to], tip), reach),
+                kind: Border::Cap,
+            });
         }
     }
-    part
+    half_planes
+}
+
+/// Corners of the convex hull, wound positively, as rows of `points` (Andrew, 1979).
+fn hull(points: &[DVec2]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&a, &b| {
+        let (p, q) = (points[a], points[b]);
+        p.x.total_cmp(&q.x)
+            .then(p.y.total_cmp(&q.y))
+            .then(a.cmp(&b))
+    });
+    order.dedup_by(|a, b| points[*a] == points[*b]);
+    let half = |order: &mut dyn Iterator<Item = usize>| {
+        let mut half: Vec<usize> = Vec::new();
+        for next in order {
+            while let [.., before, last] = half[..]
+                && cross(points[last] - points[before], points[next] - points[last]) <= 0.0
+            {
+                half.pop();
+            }
+            half.push(next);
+        }
+        half.pop();
+        half
+    };
+    let mut hull = half(&mut order.iter().copied());
+    hull.extend(half(&mut order.iter().rev().copied()));
+    hull
+}
+
+/// A box around points that bounds all zones.
+fn frame_around(points: &[DVec2], margin: f64) -> [HalfPlane; 4] {
+    let low = points.iter().copied().fold(DVec2::INFINITY, DVec2::min) - margin;
+    let high = points.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max) + margin;
+    let sides = [
+        (low, DVec2::X),
+        (high, DVec2::Y),
+        (high, -DVec2::X),
+        (low, -DVec2::Y),
+    ];
+    sides.map(|(point, along)| HalfPlane {
+        inside: distance_from(point, along),
+        kind: Border::Cap,
+    })
+}
+
+/// The corners of what all half-planes share; the last four of them are a box around it. `None` if it has
+/// no area.
+fn corners_of(half_planes: &[HalfPlane]) -> Option<Vec<Corner>> {
+    let (rest, frame) = half_planes.split_at(half_planes.len() - 4);
+    let mut corners: Vec<Corner> = (0..4)
+        .map(|k| Corner {
+            at: crossing(&frame[(k + 3) % 4].inside, &frame[k].inside),
+            side: rest.len() + k,
+        })
+        .collect();
+    for (side, half_plane) in rest.iter().enumerate() {
+        let mut kept = Vec::with_capacity(corners.len() + 1);
+        for (k, &here) in corners.iter().enumerate() {
+            let there = corners[(k + 1) % corners.len()].at;
+            let (d_here, d_there) = (half_plane.inside.at(here.at), half_plane.inside.at(there));
+            if d_here >= 0.0 {
+                kept.push(here);
+            }
+            if d_here < 0.0 && d_there > 0.0 || d_here > 0.0 && d_there < 0.0 {
+                let at = here.at + (there - here.at) * (d_here / (d_here - d_there));
+                let side = if d_here > 0.0 { side } else { here.side };
+                kept.push(Corner { at, side });
+            } else if d_here == 0.0
+                && d_there < 0.0
+                && let Some(last) = kept.last_mut()
+            {
+                last.side = side;
+            }
+        }
+        corners = kept;
+    }
+    let outline: Vec<DVec2> = corners.iter().map(|corner| corner.at).collect();
+    (signed_area(&outline) > NEGLIGIBLE_AREA).then_some(corners)
+}
+
+/// Where two lines cross.
+fn crossing(one: &Affine, other: &Affine) -> DVec2 {
+    let turn = one.a * other.b - one.b * other.a;
+    DVec2::new(
+        one.b * other.c - one.c * other.b,
+        one.c * other.a - one.a * other.c,
+    ) / turn
+}
+
+/// Leaves out free sides, the flattest corners first, as long as nothing moves outwards by more than
+/// half of `reach`.
+fn with_fewer_corners(
+    mut corners: Vec<Corner>,
+    half_planes: &[HalfPlane],
+    reach: f64,
+) -> Vec<Corner> {
+    while corners.len() > 3 {
+        let count = corners.len();
+        // Where the neighbours of side `k` meet, and how far beyond it.
+        let without = |k: usize| {
+            let own = &half_planes[corners[k].side];
+            let before = &half_planes[corners[(k + count - 1) % count].side];
+            let after = &half_planes[corners[(k + 1) % count].side];
+            if own.kind != Border::Free {
+                return None;
+            }
+            let at = crossing(&before.inside, &after.inside);
+            let is_near = half_planes.iter().all(|half_plane| {
+                let slack = match half_plane.kind {
+                    Border::Free => 0.5 * reach,
+                    Border::Cap | Border::Own => COINCIDENT,
+                };
+                half_plane.inside.at(at) >= -slack
+            });
+            let beyond = -own.inside.at(at);
+            (is_near && beyond >= 0.0).then_some((beyond, k, at))
+        };
+        let flattest = (0..count).filter_map(without);
+        let Some((_, k, at)) = flattest.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        corners[(k + 1) % count].at = at;
+        corners.remove(k);
+    }
+    corners
+}
+
+/// The corners along later shapes; `None` if those are not in one stretch.
+fn outer_border(corners: &[Corner], half_planes: &[HalfPlane]) -> Option<Vec<DVec2>> {
+    let count = corners.len();
+    let is_outer = |k: usize| half_planes[corners[k % count].side].kind != Border::Own;
+    let mut starts = (0..count).filter(|&k| is_outer(k) && !is_outer(k + count - 1));
+    let Some(first) = starts.next() else {
+        // Outside of everything, or a hole that is filled.
+        return Some(if is_outer(0) {
+            corners.iter().map(|corner| corner.at).collect()
+        } else {
+            Vec::new()
+        });
+    };
+    if starts.next().is_some() {
+        return None;
+    }
+    let length = (0..count)
+        .take_while(|&step| is_outer(first + step))
+        .count();
+    let outer = (0..=length).map(|step| corners[(first + step) % count].at);
+    Some(outer.collect())
 }

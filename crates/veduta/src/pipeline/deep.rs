@@ -1,6 +1,9 @@
 //! The same stages, up to deep pixels instead of flat ones.
 
-use super::{FACES_PER_STRIP, RenderSettings, Sampling, Step, map_of, material_of, materials_seen};
+use super::{
+    FACES_PER_STRIP, RenderSettings, Sampling, Step, map_of, material_of, materials_seen,
+    without_mattes,
+};
 use crate::accumulate::{DeepFilter, DeepRows};
 use crate::dice::{self, Bands, Dicer, Parts, PixelGrid, VeilBuffers};
 use crate::scene::Scene;
@@ -99,6 +102,7 @@ fn write_rows<E>(
     unlit: bool,
     write: &mut impl FnMut(&DeepRows) -> Result<(), E>,
 ) -> Result<(), E> {
+    let map = &*without_mattes(scene, map);
     let shown = map.shown_faces();
     let (camera, faces, light) = (&map.camera, &map.faces, Daylight::default());
     let surfaces = Surfaces::new(scene, textures, camera, faces, &shown, light, unlit);

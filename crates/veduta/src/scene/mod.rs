@@ -16,5 +16,5 @@ pub use framing::{Bounds, FRAMING_FOV, framing_camera, framing_camera_of_fov};
 pub use opacity::{Opacities, Opacity};
 pub use veduta_map::scene::{
     AlphaMode, Image, ImageId, Layer, Light, LightKind, Material, Mesh, MeshError, MeshId, Object,
-    ObjectKey, Scene, TexcoordSet, TextureRef, World, Wrap,
+    ObjectKey, Scene, Shown, TexcoordSet, TextureRef, World, Wrap,
 };

@@ -178,7 +178,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// The opacity of a fragment, if it is the same at all points of it and so is the radiance.
-    fn constant_opacity(&self, fragment: u32) -> Option<f32> {
+    pub fn constant_opacity(&self, fragment: u32) -> Option<f32> {
         let first_veil = self.surfaces.len() - self.opacities.len();
         let veil = (fragment as usize).checked_sub(first_veil)?;
         Some(self.opacities[veil])

@@ -26,13 +26,16 @@ pub(super) static PROJECTED: AtomicU64 = AtomicU64::new(0);
 /// The faces of `scene` that may be seen through `camera`, clipped to the view pyramid.
 ///
 /// Faces turned away from the eye are left out where their material is single-sided, and so are faces
-/// that let all through. Ids ascend by
+/// that let all through and objects that only cast shadows. Mattes are opaque. Ids ascend by
 /// object in [key order](Scene::key_order), then by face within the object.
 pub fn project(scene: &Scene, camera: &Camera) -> Faces {
     let groups = PlaneGroups::of(scene);
     let opacities = Opacities::of(scene);
     let mut faces = Faces::new();
     for object in scene.key_order() {
+        if !scene.shown(object).hides() {
+            continue;
+        }
         let mesh = scene.mesh_of(object);
         let view = ObjectView::new(camera, scene.object(object), mesh);
         if view.class == Class::Outside {
@@ -142,6 +145,7 @@ impl<'a> ObjectView<'a> {
         groups: &[(FaceIndex, FaceIndex)],
         opacities: &Opacities,
     ) -> Faces {
+        let is_seen = scene.shown(object).is_seen();
         let mut faces = Faces::with_capacity(range.len());
         let mut outline = Vec::new();
         let mut polygon = ClipPolygon::default();
@@ -180,7 +184,7 @@ impl<'a> ObjectView<'a> {
                 }
                 let plane = faces.push_plane(nearness);
                 let face = faces.push(outline, plane, object, source);
-                if let Some(face) = face.filter(|_| opacity == Opacity::Veil) {
+                if let Some(face) = face.filter(|_| opacity == Opacity::Veil && is_seen) {
                     faces.set_veil(face);
                 }
             }

@@ -5,10 +5,12 @@
 //! look at that scene alone.
 
 mod merge;
+mod operators;
 #[path = "../support/mod.rs"]
 mod support;
 mod zoom;
 
+use merge::maps_of;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;

@@ -65,7 +65,7 @@ fn merged_maps_show_what_all_faces_show() {
 }
 
 /// What is seen of a scene's faces dealt to `count` maps: at random, in turn, or in blocks.
-fn maps_of(scene: &Scene, count: usize) -> Vec<Seen> {
+pub fn maps_of(scene: &Scene, count: usize) -> Vec<Seen> {
     let mut rng = Rng::new(scene.seed ^ 0x6d61_7073);
     let total = scene.faces.len();
     let map_of: Vec<usize> = (0..total)

@@ -1,13 +1,15 @@
 //! `veduta info`: what a model or a picture holds, and what a camera sees at a point of a picture.
 
+mod animations;
 mod lights;
 mod model;
 mod pick;
 mod tree;
 
+use super::guests::kind_name;
 use super::render::View;
 use super::stored::Stored;
-use super::{is_picture, load};
+use super::{When, is_picture, load};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, plain, print};
 use crate::values::Size;
@@ -47,6 +49,8 @@ pub struct Info {
     size: Option<Size>,
     #[command(flatten)]
     view: View,
+    #[command(flatten)]
+    when: When,
 }
 
 const EXAMPLES: &str = "\
@@ -85,10 +89,15 @@ impl Info {
 
     /// JSON and text.
     fn model(&self, talk: &mut Talk) -> Result<(Value, String), Failure> {
-        let loaded = load(&self.file, &self.view.reading, self.strict, talk)?;
+        let options = self.when.options(&self.view.reading);
+        let loaded = load(&self.file, &options, self.strict, talk)?;
         let Some(spot) = self.pick else {
             let scene = &loaded.scene;
-            return Ok((model::as_json(scene), model::as_text(scene, self.all)));
+            let mut told = model::as_json(scene);
+            told["animations"] = animations::as_json(&loaded);
+            told["framesPerSecond"] = loaded.frames_per_second.into();
+            let text = model::as_text(scene, self.all) + &animations::as_text(&loaded);
+            return Ok((told, text));
         };
         let (camera, size) = self.view.camera(&self.file, &loaded, self.size)?;
         talk.begin("finding visibility");
@@ -166,6 +175,19 @@ fn map_told<R: Read + Seek>(seen: &Stored, file: &MapReader<R>, all: bool) -> (V
     told["camera"] = model::camera_as_json("", seen.camera());
     told["sources"] = json!(sources);
     told["generator"] = file.generator().into();
+    if let Stored::Regions(seen) = seen {
+        told["hasHoles"] = seen.has_holes.into();
+        let guests = seen.guests.iter().map(|guest| {
+            let samples = guest.samples().len();
+            json!({
+                "name": guest.name(),
+                "kind": guest.kind(),
+                "size": guest.grid().size,
+                "samples": samples,
+            })
+        });
+        told["guests"] = guests.collect();
+    }
     let again: Vec<&str> = file
         .readings()
         .iter()
@@ -183,6 +205,15 @@ fn map_told<R: Read + Seek>(seen: &Stored, file: &MapReader<R>, all: bool) -> (V
     );
     for source in sources {
         text += &format!("  made of   {}\n", plain(source));
+    }
+    if let Stored::Regions(seen) = seen {
+        for guest in &seen.guests {
+            let (name, [width, height]) = (plain(guest.name()), guest.grid().size);
+            let (kind, samples) = (kind_name(guest.kind()), guest.samples().len());
+            text += &format!(
+                "  guest     {name}: {kind}, {width} x {height} pixels, {samples} samples\n"
+            );
+        }
     }
     let mut casters: Vec<String> = Vec::new();
     if file.has_embedded_casters() {

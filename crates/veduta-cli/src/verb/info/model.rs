@@ -5,7 +5,7 @@ use crate::talk::{grouped, plain};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use veduta::map::{Camera, Projection};
-use veduta::scene::{AlphaMode, Bounds, Image, Material, Scene, TextureRef};
+use veduta::scene::{AlphaMode, Bounds, Image, Material, Scene, Shown, TextureRef};
 
 pub fn as_json(scene: &Scene) -> Value {
     let objects: Vec<_> = scene
@@ -25,7 +25,12 @@ pub fn as_json(scene: &Scene) -> Value {
         .iter()
         .map(|layer| {
             let objects = layer.objects.len();
-            json!({ "name": layer.name, "priority": layer.priority, "objects": objects })
+            json!({
+                "name": layer.name,
+                "priority": layer.priority,
+                "shown": layer.shown,
+                "objects": objects,
+            })
         })
         .collect();
     let materials: Vec<_> = scene
@@ -151,9 +156,15 @@ fn write_text(scene: &Scene, all: bool, text: &mut String) -> std::fmt::Result {
         writeln!(text, "  layers    {}", scene.layers.len())?;
         for layer in &scene.layers {
             let (name, objects) = (plain(&layer.name), layer.objects.len());
+            let shown = match layer.shown {
+                Shown::Seen => "",
+                Shown::Matte => ", a matte",
+                Shown::CasterOnly => ", only casts shadows",
+                Shown::ShadowOnly => ", only catches shadows",
+            };
             writeln!(
                 text,
-                "    {name}  priority {}, {objects} objects",
+                "    {name}  priority {}, {objects} objects{shown}",
                 layer.priority
             )?;
         }

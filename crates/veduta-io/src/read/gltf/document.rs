@@ -44,6 +44,8 @@ pub struct Document {
     #[serde(default)]
     pub skins: Vec<Skin>,
     #[serde(default)]
+    pub animations: Vec<Animation>,
+    #[serde(default)]
     pub extensions: DocumentExtensions,
 }
 
@@ -157,6 +159,37 @@ pub struct LightOfNode {
 pub struct Skin {
     pub inverse_bind_matrices: Option<Index>,
     pub joints: Vec<Index>,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct Animation {
+    pub name: Option<String>,
+    #[serde(default)]
+    pub channels: Vec<Channel>,
+    #[serde(default)]
+    pub samplers: Vec<AnimationSampler>,
+}
+
+/// What a sampler of its animation moves.
+#[derive(Debug, Deserialize)]
+pub struct Channel {
+    pub sampler: Index,
+    pub target: ChannelTarget,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct ChannelTarget {
+    pub node: Option<Index>,
+    pub path: String,
+}
+
+#[derive(Debug, Deserialize)]
+pub struct AnimationSampler {
+    /// Accessor of the keys' times.
+    pub input: Index,
+    pub interpolation: Option<String>,
+    /// Accessor of the keys' values.
+    pub output: Index,
 }
 
 #[derive(Debug, Deserialize)]

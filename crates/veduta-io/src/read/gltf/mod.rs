@@ -1,19 +1,20 @@
 //! glTF 2.0, as `.gltf` or `.glb`.
 //!
 //! Bytes -> [`container`] (the chunks of a GLB) -> [`document`] (the JSON) -> [`buffers`] (what
-//! accessors point into) -> [`tree`] (which node stands where) -> [`mesh`] by way of [`accessor`],
-//! and [`material`] -> scene. Every index and length is checked at its first use; indices in errors
+//! accessors point into) -> [`animation`] (how nodes stand at a time) -> [`tree`] (which node stands
+//! where) -> [`mesh`] by way of [`accessor`], and [`material`] -> scene. Every index and length is checked at its first use; indices in errors
 //! are those of the JSON.
 //!
 //! Extensions: those of [`UNDERSTOOD`]. Of KHR_materials_pbrSpecularGlossiness the colour is read. A
 //! file that requires another one is refused; one that merely uses another is read without it, with a
 //! warning.
 //!
-//! A mesh is read once for each [`pose`] in which it stands. Animations are not looked at: morph
-//! targets have the shares that the file gives them, joints stand where the node tree puts them.
+//! A mesh is read once for each [`pose`] in which it stands: its morph targets have the shares that the
+//! animation or the file gives them, its joints stand where the node tree puts them.
 //! Lights ([`light`]) are read; pictures do not show them yet.
 
 mod accessor;
+mod animation;
 mod buffers;
 mod camera;
 mod container;
@@ -36,8 +37,10 @@ mod tree;
 use super::budget::Budget;
 use super::error::{Fault, Place, Problem, Warnings};
 use super::files::shortened;
+use super::moment::Animation;
 use super::names::unique;
 use super::picture::PictureDecoder;
+use animation::Posed;
 use buffers::{Buffers, Files};
 use document::{Document, Index};
 use material::MaterialReader;
@@ -48,6 +51,8 @@ use std::path::Path;
 use tree::{Placed, Tree};
 use veduta::scene::{Light, MeshId, Object, Scene};
 use veduta_geometry::DMat4;
+
+pub(crate) use animation::Played;
 
 /// The first bytes of a GLB.
 pub(crate) const MAGIC: &[u8] = b"glTF";
@@ -94,10 +99,13 @@ const REPLACEABLE: &[(&str, &str)] = &[
     ),
 ];
 
-/// Reads a scene in the file's own axes.
+/// Reads a scene in the file's own axes, as it stands while an animation is played, or at rest. Tells
+/// of all `animations`.
 pub(crate) fn read(
     path: &Path,
     bytes: &[u8],
+    played: Option<Played<'_>>,
+    animations: &mut Vec<Animation>,
     budget: &mut Budget,
     warnings: &mut Warnings,
 ) -> Result<Scene, Fault> {
@@ -111,10 +119,14 @@ pub(crate) fn read(
     check_version_and_extensions(&document, warnings)?;
     let mut files = Files::new(path.parent().unwrap_or(Path::new("")));
     let buffers = Buffers::fetch(&document, bin, &mut files, budget)?;
-    let tree = Tree::grow(&document, budget)?;
+    *animations = animation::all(&document, &buffers, budget, warnings)?;
+    let posed = animation::pose(&document, &buffers, animations, played, budget, warnings)?;
+    let tree = Tree::grow(&document, &posed, budget)?;
 
     let mut scene = Scene::default();
-    place_meshes(&document, &buffers, &tree, &mut scene, budget, warnings)?;
+    place_meshes(
+        &document, &buffers, &posed, &tree, &mut scene, budget, warnings,
+    )?;
     place_cameras(&document, &tree, &mut scene, budget, warnings)?;
     place_lights(&document, &tree, &mut scene, budget, warnings)?;
     read_materials(
@@ -193,12 +205,14 @@ fn check_version_and_extensions(document: &Document, warnings: &mut Warnings) ->
 fn place_meshes(
     document: &Document,
     buffers: &Buffers<'_>,
+    posed: &Posed,
     tree: &Tree,
     scene: &mut Scene,
     budget: &mut Budget,
     warnings: &mut Warnings,
 ) -> Result<(), Fault> {
     let mut poses = Poses {
+        posed,
         skins: document.skins.iter().map(|_| None).collect(),
         read: HashMap::new(),
     };
@@ -250,7 +264,8 @@ fn place_meshes(
 }
 
 /// The meshes read so far, by pose.
-struct Poses {
+struct Poses<'a> {
+    posed: &'a Posed,
     /// For each skin of the document, once it was asked for.
     skins: Vec<Option<Skin>>,
     /// The mesh's id, unless it has no faces.
@@ -266,7 +281,7 @@ struct PoseKey {
     weights: Option<Vec<u32>>,
 }
 
-impl Poses {
+impl Poses<'_> {
     /// The mesh that a node shows, if it shows one; read if it was not yet. `at` is the node's path.
     fn mesh_of(
         &mut self,
@@ -282,17 +297,20 @@ impl Poses {
             return Ok(None);
         };
         let (index, mesh) = row(&document.meshes, mesh, "mesh", at)?;
+        let moved = self.posed.node(placed.node);
+        let weights = moved.and_then(|moved| moved.weights.as_ref());
+        let weights = weights.or(node.weights.as_ref());
         let bits = |weights: &Vec<f32>| weights.iter().map(|weight| weight.to_bits()).collect();
         let key = PoseKey {
             mesh: index,
             skin: node.skin,
-            weights: node.weights.as_ref().map(bits),
+            weights: weights.map(bits),
         };
         if let Some(&known) = self.read.get(&key) {
             return Ok(known);
         }
         let mut pose = Pose {
-            weights: node.weights.as_ref().unwrap_or(&mesh.weights),
+            weights: weights.unwrap_or(&mesh.weights),
             skin: None,
         };
         if let Some(skin) = node.skin {

@@ -1,7 +1,7 @@
 //! How a mesh stands: its morph targets and its skin.
 //!
-//! glTF 2.0, §3.7.2.2 and §3.7.3. Targets have the shares that the file gives them, and joints stand
-//! where the node tree puts them: no animation is looked at. What is posed is a mesh of its own.
+//! glTF 2.0, §3.7.2.2 and §3.7.3. Targets have the shares that they are given, and joints stand where the
+//! node tree puts them: what moves both is known before. What is posed is a mesh of its own.
 
 use super::accessor::Elements;
 use super::buffers::Buffers;

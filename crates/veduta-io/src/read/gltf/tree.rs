@@ -1,5 +1,6 @@
 //! The node tree: which node stands where, and what it is called.
 
+use super::animation::Posed;
 use super::document::{Document, Index, Node};
 use super::{Fault, Problem, row};
 use crate::read::budget::Budget;
@@ -28,8 +29,9 @@ pub struct Placed {
 impl Tree {
     /// Walks the tree of the document's scene, or of all nodes if it has no scene.
     ///
-    /// Trees may be as deep as memory allows: nothing here recurses.
-    pub fn grow(document: &Document, budget: &mut Budget) -> Result<Self, Fault> {
+    /// Nodes stand as `posed` says, else as their own transforms say. Trees may be as deep as memory
+    /// allows: nothing here recurses.
+    pub fn grow(document: &Document, posed: &Posed, budget: &mut Budget) -> Result<Self, Fault> {
         let nodes = &document.nodes;
         let parents = parents(nodes)?;
         refuse_cycles(nodes, &parents)?;
@@ -45,7 +47,7 @@ impl Tree {
             .map(|&root| (root, DMat4::IDENTITY))
             .collect();
         while let Some((node, world_from_parent)) = waiting.pop() {
-            let world_from_node = world_from_parent * local_transform(node, &nodes[node])?;
+            let world_from_node = world_from_parent * local_transform(node, &nodes[node], posed)?;
             places[node] = Some(placed.len() as u32);
             placed.push(Placed {
                 node,
@@ -186,8 +188,8 @@ fn label_siblings(
     Ok(())
 }
 
-/// A node's own transform (glTF 2.0, §3.5.3).
-fn local_transform(index: usize, node: &Node) -> Result<DMat4, Fault> {
+/// A node's own transform (glTF 2.0, §3.5.3), or what an animation puts in its place.
+fn local_transform(index: usize, node: &Node, posed: &Posed) -> Result<DMat4, Fault> {
     let illegal = |field: &str, found: String, expected: &'static str| {
         Problem::Illegal { found, expected }.at_json(format!("nodes[{index}].{field}"))
     };
@@ -216,9 +218,15 @@ fn local_transform(index: usize, node: &Node) -> Result<DMat4, Fault> {
             quaternion / length
         }
     };
+    let posed = posed.node(index);
+    let own = node.scale.map_or(DVec3::ONE, DVec3::from_array);
+    let scale = posed.and_then(|posed| posed.scale).unwrap_or(own);
+    let rotation = posed.and_then(|posed| posed.rotation).unwrap_or(rotation);
+    let own = node.translation.map_or(DVec3::ZERO, DVec3::from_array);
+    let translation = posed.and_then(|posed| posed.translation).unwrap_or(own);
     Ok(DMat4::from_scale_rotation_translation(
-        node.scale.map_or(DVec3::ONE, DVec3::from_array),
+        scale,
         rotation,
-        node.translation.map_or(DVec3::ZERO, DVec3::from_array),
+        translation,
     ))
 }

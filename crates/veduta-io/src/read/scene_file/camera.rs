@@ -1,7 +1,11 @@
 //! Cameras of the file -> cameras of the scene.
 
+use super::Time;
 use super::document::{Camera as CameraTable, Document};
+use super::keys::CameraKeys;
 use super::source::Faults;
+use super::value::Interpolation;
+use crate::read::{Animation, AnimationKind};
 use veduta::geometry::DVec3;
 use veduta::map::{Camera, Projection};
 use veduta::scene::{Bounds, FRAMING_FOV, Scene};
@@ -23,33 +27,55 @@ pub struct NamedCamera {
     has_near: bool,
     /// From the eye to what it looks at, in metres.
     distance: f64,
+    /// If it has keys.
+    pub animation: Option<Animation>,
 }
 
-/// The cameras of the file, in its order.
-pub fn all(document: &Document, faults: &mut Faults) -> Vec<NamedCamera> {
+/// The cameras of the file at a moment, in its order.
+pub fn all(document: &Document, time: Time, faults: &mut Faults) -> Vec<NamedCamera> {
     let Some(cameras) = &document.camera else {
         return Vec::new();
     };
     let mut all = Vec::new();
     for (name, table) in &cameras.value.0 {
-        match camera(table) {
+        let keys = table.keys.as_ref().map(|keys| {
+            let interpolation = table.interpolation.as_ref();
+            let interpolation = interpolation.map_or(Interpolation::default(), |how| how.value);
+            CameraKeys::of(&keys.value, interpolation, time.frames_per_second, faults)
+        });
+        let keyed = keys.as_ref();
+        let eye = keyed.and_then(|keys| keys.eye(time.seconds));
+        let look_at = keyed.and_then(|keys| keys.look_at(time.seconds));
+        let eye = eye.unwrap_or(table.eye.value.0);
+        let look_at = look_at.unwrap_or(table.look_at.value.0);
+        match camera(table, eye, look_at) {
             Some(camera) => {
-                let offset = table.look_at.value.0 - table.eye.value.0;
+                let offset = look_at - eye;
                 all.push(NamedCamera {
                     name: name.value.0.clone(),
                     camera,
                     size: table.size.as_ref().map(|size| size.value.0),
                     has_near: table.near.is_some(),
                     distance: offset.length(),
+                    animation: keys.map(|keys| Animation {
+                        name: name.value.0.clone(),
+                        kind: AnimationKind::Camera,
+                        seconds: keys.end,
+                    }),
                 });
             }
             None => {
+                let when = match &table.keys {
+                    Some(_) => format!(", {} s after the beginning", time.seconds),
+                    None => String::new(),
+                };
                 let message = format!(
-                    "camera {:?}: eye, look_at and up define no direction: the eye must not stand \
-                     on what it looks at, nor look along up",
+                    "camera {:?}{when}: eye, look_at and up define no direction: the eye must not \
+                     stand on what it looks at, nor look along up",
                     name.value.0
                 );
                 let at = table.up.as_ref().map_or(&table.look_at.span, |up| &up.span);
+                let at = table.keys.as_ref().map_or(at, |keys| &keys.span);
                 faults.senseless(at.clone(), message);
             }
         }
@@ -57,7 +83,7 @@ pub fn all(document: &Document, faults: &mut Faults) -> Vec<NamedCamera> {
     all
 }
 
-fn camera(table: &CameraTable) -> Option<Camera> {
+fn camera(table: &CameraTable, eye: DVec3, look_at: DVec3) -> Option<Camera> {
     let aspect = match &table.size {
         Some(size) => {
             let [width, height] = size.value.0.map(f64::from);
@@ -87,7 +113,6 @@ fn camera(table: &CameraTable) -> Option<Camera> {
         }
     };
     let near = table.near.as_ref().map_or(0.0, |near| near.value.0);
-    let (eye, look_at) = (table.eye.value.0, table.look_at.value.0);
     let looking = |up| Camera::looking(eye, look_at, up, projection, near);
     let mut camera = match &table.up {
         Some(up) => looking(up.value.0),

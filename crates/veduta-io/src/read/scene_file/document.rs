@@ -3,12 +3,14 @@
 use super::form::{Fields, Form, Given, Key, Layout, List, Named, Node, described, table};
 use super::source::Faults;
 use super::value::{
-    Angle, CameraName, Color, Direction, Emission, FieldOfView, FilePath, Flag, Length, LensLength,
-    Lod, Matrix, Name, Opacity, PictureSize, Priority, Repeat, Scale, Shift, Text, Up, Vector,
+    Angle, CameraName, Color, Direction, Emission, FieldOfView, FilePath, Flag, FramesPerSecond,
+    Interpolation, Length, LensLength, Lod, Matrix, Name, Opacity, PictureSize, Played, Priority,
+    Repeat, Scale, Shift, Text, Time, Up, Vector,
 };
 use crate::read::error::Problem;
 use serde_json::{Value, json};
 use toml::de::DeValue;
+use veduta::scene::Shown;
 
 table! {
     /// A scene of Veduta: models in layers, cameras, and changes to materials.
@@ -16,6 +18,8 @@ table! {
     "a scene file" => struct Document {
         /// Where on Earth the scene is. Needed when several georeferenced models meet.
         optional world: World,
+        /// How time is counted. What moves has keys: layers and cameras.
+        optional animation: Animation,
         /// Cameras by name. The first is the one that is used when none is asked for.
         optional camera: Named<CameraName, Camera>,
         /// The parts of the scene, each of which can be made apart from the others.
@@ -50,6 +54,14 @@ table! {
 }
 
 table! {
+    /// How time is counted.
+    "[animation]" => struct Animation {
+        /// Frames a second; 24 by default. Frame 0 is at 0 seconds.
+        optional fps: FramesPerSecond,
+    }
+}
+
+table! {
     /// A camera. Its field of view is told by one of fov, focal_length and parallel; fov is 35deg
     /// if none is there.
     "[camera.NAME]" => struct Camera {
@@ -75,9 +87,25 @@ table! {
         optional near: Length,
         /// Width and height of the picture in pixels, where no other size is asked for.
         optional size: PictureSize,
+        /// Where it is at which times, ascending. What lies between two keys is interpolated.
+        optional keys: List<CameraKey>,
+        /// How it goes from key to key: evenly (linear, the default), gently (ease) or at once (step).
+        optional interpolation: Interpolation,
     }
     exclude (fov, focal_length) (fov, parallel) (focal_length, parallel)
-    needs (sensor_height, focal_length)
+    needs (sensor_height, focal_length) (interpolation, keys)
+}
+
+table! {
+    /// Where a camera is at a time. What no key names stays as the camera has it.
+    "keys" => struct CameraKey {
+        /// When: seconds, or with a unit, such as "1.5 s" or "36 frames".
+        required time: Time,
+        /// Where the eye stands.
+        optional eye: Vector,
+        /// What it looks at.
+        optional look_at: Vector,
+    }
 }
 
 table! {
@@ -94,13 +122,29 @@ table! {
         optional lod: Lod,
         /// How the model is placed in the scene.
         optional at: Placement,
+        /// Where the model is at which times, ascending. What lies between two keys is interpolated,
+        /// word by word: before the first key that names a word and after the last it stays as it is
+        /// there, and what no key names stays as at has it.
+        optional keys: List<PlacementKey>,
+        /// How it goes from key to key: evenly (linear, the default), gently (ease) or at once (step).
+        optional interpolation: Interpolation,
+        /// The animation of a glTF model that is played, by its name, or true for its first; none by
+        /// default, so that the model stands at rest.
+        optional animation: Played,
+        /// Keys and animation begin again when they are over; else all stays as at their end.
+        optional repeat: Flag,
         /// Of faces in one plane those of the layer with the higher priority are seen; 0 by default.
         optional priority: Priority,
+        /// Whether it is seen. A matte hides what is behind it and gives nothing itself: the picture has
+        /// a hole of its shape. What is caster-only hides nothing and will cast shadows, what is
+        /// shadow-only is a matte that will catch them, once there are any.
+        optional shown: Shown,
         /// A table (CSV) of places at which the model stands: a header with the columns x, y, z and
         /// any of heading, pitch, roll, scale, name; metres and degrees. heading turns clockwise seen
         /// from above; pitch lifts the model's +y, roll lowers its +x. at comes before.
         optional instances: FilePath,
     }
+    needs (interpolation, keys)
 }
 
 table! {
@@ -116,6 +160,21 @@ table! {
         optional matrix: Matrix,
     }
     exclude (matrix, translate) (matrix, rotate) (matrix, scale)
+}
+
+table! {
+    /// Where a layer's model is at a time, in the words of at.
+    "keys" => struct PlacementKey {
+        /// When: seconds, or with a unit, such as "1.5 s" or "36 frames".
+        required time: Time,
+        /// Where the model's origin comes to lie, in metres.
+        optional translate: Vector,
+        /// A turn about an axis through the model's origin. Between keys with one axis the angle goes
+        /// evenly, by whole turns too; else the shortest way is taken.
+        optional rotate: Rotation,
+        /// A factor, or one each along x, y and z.
+        optional scale: Scale,
+    }
 }
 
 table! {

@@ -1,7 +1,10 @@
-//! What a scene file draws in: which files are being read, and how much memory all may take.
+//! What a scene file draws in: which files are being read, how much memory all may take, and at which
+//! moment all is read.
 
 use crate::read::budget::Budget;
-use crate::read::error::Problem;
+use crate::read::error::{Problem, ReadError};
+use crate::read::over_time::Models;
+use crate::read::{Loaded, ReadOptions};
 use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -18,24 +21,32 @@ const MOST_PICTURE_BYTES: u64 = 4 << 30;
 
 /// The files that are being read, each because the one before names it.
 #[derive(Debug)]
-pub(crate) struct Inclusion {
+pub(crate) struct Inclusion<'m> {
     /// Scene files, from the outermost to the innermost: as named, and in one way only.
     chain: Vec<(PathBuf, PathBuf)>,
     /// Files whose length the budget has been told.
     known: BTreeSet<PathBuf>,
     budget: Budget,
     picture_bytes: u64,
+    /// Models that may have been read before.
+    models: &'m mut Models,
 }
 
-impl Inclusion {
+impl<'m> Inclusion<'m> {
     /// For a scene file that nobody includes.
-    pub fn new() -> Self {
+    pub fn new(models: &'m mut Models) -> Self {
         Self {
+            models,
             chain: Vec::new(),
             known: BTreeSet::new(),
             budget: Budget::new(),
             picture_bytes: 0,
         }
+    }
+
+    /// Reads a model that is no scene file.
+    pub fn read_model(&mut self, path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
+        self.models.read(path, options)
     }
 
     /// Says that `scene_file` is being read until [`Inclusion::leave`].

@@ -38,7 +38,7 @@ pub struct Instance {
 /// Reads a table.
 pub fn read(
     path: &Path,
-    inclusion: &mut Inclusion,
+    inclusion: &mut Inclusion<'_>,
     warnings: &mut Warnings,
 ) -> Result<Vec<Instance>, ReadError> {
     let whole = |problem: Problem| problem.at(Place::Whole).of(path);

@@ -1,32 +1,37 @@
 //! Layers: models are read and placed in the scene.
 
-use super::document::{Document, Placement};
+use super::document::Document;
 use super::inclusion::Inclusion;
-use super::instances;
+use super::keys::{LayerKeys, world_from_model};
 use super::source::{Faults, Source, Span};
-use super::value::Up;
-use super::{find_file, is_scene_file, read_included};
+use super::value::{Played, Up};
+use super::{Time, find_file, instances, is_scene_file, read_included};
 #[cfg(feature = "cityjson")]
 use crate::read::LevelOfDetail;
 use crate::read::error::{Problem, ReadError, Warnings};
 use crate::read::names::unique;
-use crate::read::{Loaded, ReadOptions, UpAxis, read_model};
+use crate::read::{Animation, AnimationKind, Loaded, Moment, ReadOptions, UpAxis};
 use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use veduta::geometry::{DMat4, DQuat, DVec3};
+use veduta::geometry::{DMat4, DVec3};
 use veduta::map::{Camera, MaterialId, Projection};
-use veduta::scene::{ImageId, Light, MeshId, Object, Scene};
+use veduta::scene::{ImageId, Layer, Light, MeshId, Object, Scene, Shown};
 
 /// A layer whose files are there.
 #[derive(Debug)]
 pub struct PlannedLayer<'d> {
     pub name: &'d str,
     pub priority: i32,
+    shown: Shown,
     model: PathBuf,
     pub model_span: Span,
     options: ReadOptions,
+    /// Where the animation that is played is asked for.
+    animation_span: Option<Span>,
     at: DMat4,
+    /// When its last key is, in seconds, if it has keys.
+    keys_end: Option<f64>,
     instances: Option<(PathBuf, Span)>,
 }
 
@@ -39,9 +44,33 @@ pub struct Part {
 }
 
 impl PlannedLayer<'_> {
+    /// The layer, without objects, before object `next` of a scene.
+    fn row(&self, next: u32, shown: Shown) -> Layer {
+        Layer {
+            name: self.name.to_owned(),
+            priority: self.priority,
+            shown,
+            objects: next..next,
+        }
+    }
+
     /// Whether its places come from a table.
     pub fn has_instances(&self) -> bool {
         self.instances.is_some()
+    }
+
+    /// What moves it, and what moves in its model or could.
+    pub fn animations(&self, loaded: &Loaded) -> Vec<Animation> {
+        let keys = self.keys_end.map(|seconds| Animation {
+            name: self.name.to_owned(),
+            kind: AnimationKind::Layer,
+            seconds,
+        });
+        let of_model = loaded.animations.iter().map(|animation| Animation {
+            name: prefixed(self.name, &animation.name),
+            ..animation.clone()
+        });
+        keys.into_iter().chain(of_model).collect()
     }
 }
 
@@ -49,6 +78,7 @@ impl PlannedLayer<'_> {
 pub fn plan<'d>(
     document: &'d Document,
     scene_file: &Path,
+    time: Time,
     faults: &mut Faults,
 ) -> Vec<PlannedLayer<'d>> {
     let mut layers = Vec::new();
@@ -87,14 +117,35 @@ pub fn plan<'d>(
             let message = "`lod` is for city models (.city.json, .city.jsonl); leave it out";
             faults.senseless(lod.span.clone(), message);
         }
-        let at = layer.at.as_ref();
+        let played = layer.animation.as_ref();
+        let plays = played.is_some_and(|played| played.value != Played::None);
+        if let (Some(played), Some(model)) = (played, &model)
+            && !may_have_animations(model)
+        {
+            let message = "`animation` is for glTF models (.glb, .gltf); leave it out";
+            faults.senseless(played.span.clone(), message);
+        }
+        if let Some(repeat) = &layer.repeat
+            && layer.keys.is_none()
+            && !plays
+        {
+            let message = "`repeat` is for a layer with `keys` or `animation`; leave it out";
+            faults.senseless(repeat.span.clone(), message);
+        }
+        let at = layer.at.as_ref().map(|at| &at.value);
+        let keys = LayerKeys::of(layer, time.frames_per_second, faults);
         if let (Some(model), None | Some(Some(_))) = (model, &instances) {
+            let is_timed = plays || is_scene_file(&model);
             layers.push(PlannedLayer {
                 name,
                 priority: layer
                     .priority
                     .as_ref()
                     .map_or(0, |priority| priority.value.0),
+                shown: layer
+                    .shown
+                    .as_ref()
+                    .map_or(Shown::Seen, |shown| shown.value),
                 model,
                 model_span,
                 options: ReadOptions {
@@ -104,8 +155,23 @@ pub fn plan<'d>(
                         level: lod.value.level,
                         refinement: lod.value.refinement,
                     }),
+                    moment: if is_timed {
+                        Moment::Seconds(time.seconds)
+                    } else {
+                        Moment::Rest
+                    },
+                    animation: played.and_then(|played| match &played.value {
+                        Played::Named(name) => Some(name.clone()),
+                        Played::First | Played::None => None,
+                    }),
+                    repeats: layer.repeat.as_ref().is_some_and(|repeat| repeat.value.0),
                 },
-                at: at.map_or(DMat4::IDENTITY, |at| world_from_model(&at.value)),
+                animation_span: played.map(|played| played.span.clone()),
+                at: match &keys {
+                    Some(keys) => keys.world_from_model(at, time.seconds),
+                    None => at.map_or(DMat4::IDENTITY, world_from_model),
+                },
+                keys_end: keys.as_ref().map(|keys| keys.end),
                 instances: instances.flatten(),
             });
         }
@@ -121,27 +187,18 @@ fn is_city_model(path: &Path) -> bool {
     })
 }
 
-/// Scale, then rotation, then translation; or the matrix.
-fn world_from_model(at: &Placement) -> DMat4 {
-    if let Some(matrix) = &at.matrix {
-        return matrix.value.0;
-    }
-    let rotation = at.rotate.as_ref().map_or(DQuat::IDENTITY, |rotate| {
-        let rotate = &rotate.value;
-        DQuat::from_axis_angle(rotate.axis.value.0, rotate.angle.value.0)
-    });
-    DMat4::from_scale_rotation_translation(
-        at.scale.as_ref().map_or(DVec3::ONE, |scale| scale.value.0),
-        rotation,
-        at.translate.as_ref().map_or(DVec3::ZERO, |by| by.value.0),
-    )
+/// Whether a file may be one of the formats that have animations, by its name.
+fn may_have_animations(path: &Path) -> bool {
+    path.extension().is_some_and(|suffix| {
+        suffix.eq_ignore_ascii_case("glb") || suffix.eq_ignore_ascii_case("gltf")
+    })
 }
 
 /// Reads the models of `layers`, a part for each.
 pub fn read(
     layers: &[PlannedLayer<'_>],
     source: &Source<'_>,
-    inclusion: &mut Inclusion,
+    inclusion: &mut Inclusion<'_>,
     warnings: &mut Warnings,
 ) -> Result<Vec<Part>, ReadError> {
     let mut parts = Vec::with_capacity(layers.len());
@@ -153,7 +210,14 @@ pub fn read(
             inclusion.leave();
             loaded
         } else {
-            read_model(&layer.model, &layer.options)?
+            let loaded = inclusion.read_model(&layer.model, &layer.options);
+            loaded.map_err(|error| match (error.problem, &layer.animation_span) {
+                // Where the name stands, not the file that lacks it.
+                (problem @ Problem::NoAnimation { .. }, Some(span)) => {
+                    source.error(span.clone(), problem)
+                }
+                (problem, _) => ReadError { problem, ..error },
+            })?
         };
         inclusion.append_files(std::mem::take(&mut loaded.files));
         let charged = inclusion.charge_model(&layer.model, &loaded.scene);
@@ -171,14 +235,14 @@ pub fn read(
     Ok(parts)
 }
 
-/// Adds a part to the scene, all its names under that of the layer; the sizes of pictures that its
+/// Adds a part to the scene as a layer, all its names under that of the layer; the sizes of pictures that its
 /// cameras ask for.
 pub fn append(
     scene: &mut Scene,
     layer: &PlannedLayer<'_>,
     part: Part,
     source: &Source<'_>,
-    inclusion: &mut Inclusion,
+    inclusion: &mut Inclusion<'_>,
     warnings: &mut Warnings,
 ) -> Result<Vec<(String, [u32; 2])>, ReadError> {
     // All fields are named, so that none that is new is lost here.
@@ -189,9 +253,23 @@ pub fn append(
         images,
         cameras,
         lights,
-        layers: _,
+        layers,
         world: _,
     } = part.loaded.scene;
+    // What is not simply seen in a scene file stays so where that is a layer of another.
+    let shown_of = |object: usize| {
+        let of = layers
+            .iter()
+            .find(|of| of.objects.contains(&(object as u32)));
+        let own = of.map_or(Shown::Seen, |of| of.shown);
+        if layer.shown.is_seen() {
+            own
+        } else {
+            layer.shown
+        }
+    };
+    let next = scene.objects.len() as u32;
+    scene.layers.push(layer.row(next, layer.shown));
     let first_mesh = scene.meshes.len();
     let first_image = scene.images.len() as u32;
     let first_material = scene.materials.len();
@@ -227,9 +305,10 @@ pub fn append(
             None => layer.name.to_owned(),
             Some(instance) => format!("{}/{instance}", layer.name),
         };
-        for object in &objects {
+        for (index, object) in objects.iter().enumerate() {
             let name = prefixed(&prefix, &object.name);
             charge(size_of::<Object>() + name.len())?;
+            add_to_layer(scene, layer, shown_of(index));
             scene.objects.push(Object {
                 name,
                 mesh: MeshId((first_mesh + object.mesh.0 as usize) as u32),
@@ -275,6 +354,25 @@ pub fn append(
     let is_known = |(name, _): &(String, [u32; 2])| scene.cameras.iter().any(|(of, _)| of == name);
     sizes.retain(is_known);
     Ok(sizes)
+}
+
+/// Says that the next object of the scene is of `layer`, the last one. A layer of which not all objects are
+/// shown alike has several rows.
+fn add_to_layer(scene: &mut Scene, layer: &PlannedLayer<'_>, shown: Shown) {
+    let next = scene.objects.len() as u32;
+    match scene.layers.last_mut() {
+        Some(last) if last.shown == shown || last.objects.is_empty() => {
+            last.shown = shown;
+            last.objects.end = next + 1;
+        }
+        _ => {
+            let row = layer.row(next, shown);
+            scene.layers.push(Layer {
+                objects: next..next + 1,
+                ..row
+            });
+        }
+    }
 }
 
 /// A name under another; what has none is called as what it is of.
@@ -335,6 +433,7 @@ fn moved_light(model_from_light: &DMat4, world_from_model: &DMat4) -> DMat4 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use veduta::geometry::DQuat;
 
     #[test]
     fn a_light_moves_with_its_model_and_stays_rigid_in_any_place() {

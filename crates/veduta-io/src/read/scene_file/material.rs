@@ -60,7 +60,7 @@ pub fn change(
     scene: &mut Scene,
     globs: &[Globbed<'_>],
     source: &Source<'_>,
-    inclusion: &mut Inclusion,
+    inclusion: &mut Inclusion<'_>,
     warnings: &mut Warnings,
 ) -> Result<(), ReadError> {
     let mut pictures = Pictures {
@@ -180,7 +180,7 @@ impl Pictures {
         named: &str,
         span: &Span,
         source: &Source<'_>,
-        inclusion: &mut Inclusion,
+        inclusion: &mut Inclusion<'_>,
         warnings: &mut Warnings,
     ) -> Result<Option<ImageId>, ReadError> {
         let mut warn = |message: String| {

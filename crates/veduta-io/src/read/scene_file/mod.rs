@@ -18,14 +18,17 @@ mod document;
 mod form;
 mod inclusion;
 mod instances;
+mod keys;
 mod layer;
 mod material;
 mod source;
 mod value;
 
 use super::error::{Place, Problem, ReadError, Warning, Warnings};
+use super::moment::USUAL_FRAMES_PER_SECOND;
 use super::names::neighbour;
-use super::{Loaded, ReadOptions, finish};
+use super::over_time::Models;
+use super::{Animation, Loaded, Moment, ReadOptions, finish};
 use document::{Changes, Document};
 use form::{Form, Node};
 use inclusion::Inclusion;
@@ -33,7 +36,7 @@ use serde_json::{Value, json};
 use source::{Faults, Source};
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
-use veduta::scene::{Layer, Scene};
+use veduta::scene::Scene;
 
 /// Whether a file is a scene file, by its name.
 pub(crate) fn is_scene_file(path: &Path) -> bool {
@@ -53,8 +56,12 @@ pub fn scene_file_schema() -> Value {
 }
 
 /// Reads a scene file and the models it names.
-pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadError> {
-    let mut inclusion = Inclusion::new();
+pub(crate) fn read(
+    path: &Path,
+    options: &ReadOptions,
+    models: &mut Models,
+) -> Result<Loaded, ReadError> {
+    let mut inclusion = Inclusion::new(models);
     inclusion
         .enter(path)
         .map_err(|problem| problem.at(Place::Whole).of(path))?;
@@ -69,7 +76,7 @@ pub(crate) fn read(path: &Path, options: &ReadOptions) -> Result<Loaded, ReadErr
 fn read_included(
     path: &Path,
     options: &ReadOptions,
-    inclusion: &mut Inclusion,
+    inclusion: &mut Inclusion<'_>,
 ) -> Result<Loaded, ReadError> {
     let whole = |problem: Problem| problem.at(Place::Whole).of(path);
     let bytes = inclusion.read(path);
@@ -78,15 +85,28 @@ fn read_included(
     let document: Document = read_form("a scene file", &source)?;
 
     let mut warnings = Warnings::new(path.to_owned());
-    if *options != ReadOptions::default() {
-        let message = "its models are read as its layers say, so that no axis or level of detail \
-            can be asked for; they have `up` and `lod`";
+    let untimed = ReadOptions {
+        moment: Moment::Rest,
+        ..options.clone()
+    };
+    if untimed != ReadOptions::default() {
+        let message = "its models are read as its layers say, so that no axis, level of detail or \
+            animation can be asked for; they have `up`, `lod` and `animation`";
         warnings.add(Place::Whole, message);
     }
+    let animation = document.animation.as_ref();
+    let fps = animation.and_then(|animation| animation.value.fps.as_ref());
+    let frames_per_second = fps.map_or(USUAL_FRAMES_PER_SECOND, |fps| fps.value.0);
+    // Of a scene file there is a beginning, but no rest.
+    let seconds = options.moment.seconds(frames_per_second).unwrap_or(0.0);
+    let time = Time {
+        seconds,
+        frames_per_second,
+    };
     let mut faults = Faults::default();
-    let cameras = camera::all(&document, &mut faults);
+    let cameras = camera::all(&document, time, &mut faults);
     let globs = material::globs(&document.material, &mut faults);
-    let layers = layer::plan(&document, path, &mut faults);
+    let layers = layer::plan(&document, path, time, &mut faults);
     faults.finish(&source)?;
 
     let mut parts = layer::read(&layers, &source, inclusion, &mut warnings)?;
@@ -103,16 +123,15 @@ fn read_included(
         scene.cameras.push((camera.name.clone(), camera.camera));
         picture_sizes.extend(camera.size.map(|size| (camera.name.clone(), size)));
     }
+    let mut animations: Vec<Animation> = cameras
+        .iter()
+        .filter_map(|camera| camera.animation.clone())
+        .collect();
     let default_camera = cameras.first().map(|camera| camera.name.clone());
     for (layer, part) in layers.iter().zip(parts) {
-        let first = scene.objects.len() as u32;
+        animations.extend(layer.animations(&part.loaded));
         let sizes = layer::append(&mut scene, layer, part, &source, inclusion, &mut warnings)?;
         picture_sizes.extend(sizes);
-        scene.layers.push(Layer {
-            name: layer.name.to_owned(),
-            priority: layer.priority,
-            objects: first..scene.objects.len() as u32,
-        });
     }
     material::change(&mut scene, &globs, &source, inclusion, &mut warnings)?;
     camera::set_near_planes(&mut scene, &cameras);
@@ -123,7 +142,16 @@ fn read_included(
         files: Vec::new(),
         default_camera,
         picture_sizes,
+        animations,
+        frames_per_second,
     })
+}
+
+/// The moment at which a scene file is read.
+#[derive(Clone, Copy, Debug)]
+struct Time {
+    seconds: f64,
+    frames_per_second: f64,
 }
 
 /// Changes materials of a scene that is there already, as a scene file changes those that its models
@@ -143,7 +171,8 @@ pub fn change_scene(
     let globs = material::globs(&changes.material, &mut faults);
     faults.finish(&source)?;
     let mut warnings = Warnings::new(path.to_owned());
-    let mut inclusion = Inclusion::new();
+    let mut models = Models::default();
+    let mut inclusion = Inclusion::new(&mut models);
     inclusion.add_input(path, text.len());
     material::change(scene, &globs, &source, &mut inclusion, &mut warnings)?;
     Ok(warnings.finish())

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 use toml::de::DeValue;
 use veduta::geometry::{DMat4, DVec2, DVec3, DVec4, Vec2};
+use veduta::scene::Shown;
 
 /// A number. TOML also has infinities and what is no number at all; those are refused.
 fn number(value: &DeValue<'_>) -> Option<f64> {
@@ -178,6 +179,117 @@ impl Leaf for LensLength {
     }
 }
 
+/// A time after the beginning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Time {
+    Seconds(f64),
+    Frames(f64),
+}
+
+const TIME_UNITS: &[(&str, f64)] = &[("min", 60.0), ("ms", 1e-3), ("s", 1.0)];
+const FRAME_UNITS: &[(&str, f64)] = &[("frames", 1.0), ("frame", 1.0)];
+
+impl Time {
+    /// The latest: some months. Later times are slips, and only they could lose their fractions.
+    const MOST: f64 = 1e7;
+
+    pub fn seconds(self, frames_per_second: f64) -> f64 {
+        match self {
+            Self::Seconds(seconds) => seconds,
+            Self::Frames(frames) => frames / frames_per_second,
+        }
+    }
+}
+
+impl Leaf for Time {
+    const EXPECTED: &'static str =
+        "a time from 0 on in seconds, or with a unit, such as \"1.5 s\" or \"36 frames\"";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        let seconds = number(value).or_else(|| quantity(value, TIME_UNITS));
+        let frames = || quantity(value, FRAME_UNITS).map(Self::Frames);
+        let time = seconds.map(Self::Seconds).or_else(frames)?;
+        let (Self::Seconds(number) | Self::Frames(number)) = time;
+        ranged(time, (0.0..=Self::MOST).contains(&number))
+    }
+
+    fn schema() -> Value {
+        let units = [TIME_UNITS, FRAME_UNITS].concat();
+        json!({ "anyOf": [
+            { "type": "number" },
+            { "type": "string", "pattern": quantity_pattern(&units) },
+        ] })
+    }
+}
+
+/// How many frames a second has.
+#[derive(Clone, Copy, Debug)]
+pub struct FramesPerSecond(pub f64);
+
+impl Leaf for FramesPerSecond {
+    const EXPECTED: &'static str = "a number from 0.001 to 1000, such as 24 or 29.97";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        let number = number(value).filter(|number| (0.001..=1000.0).contains(number))?;
+        Some(Ok(Self(number)))
+    }
+
+    fn schema() -> Value {
+        json!({ "type": "number", "minimum": 0.001, "maximum": 1000 })
+    }
+}
+
+/// What is between two keys.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    Step,
+    #[default]
+    Linear,
+    Ease,
+}
+
+impl Leaf for Interpolation {
+    const EXPECTED: &'static str = "\"linear\", \"ease\" or \"step\"";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        match value.as_str()? {
+            "step" => Some(Ok(Self::Step)),
+            "linear" => Some(Ok(Self::Linear)),
+            "ease" => Some(Ok(Self::Ease)),
+            _ => None,
+        }
+    }
+
+    fn schema() -> Value {
+        json!({ "enum": ["linear", "ease", "step"] })
+    }
+}
+
+/// An animation of a model: true for its first, or its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Played {
+    None,
+    First,
+    Named(String),
+}
+
+impl Leaf for Played {
+    const EXPECTED: &'static str = "a name of an animation, true for the first, or false for none";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        Some(Ok(match value {
+            DeValue::Boolean(false) => Self::None,
+            DeValue::Boolean(true) => Self::First,
+            DeValue::String(name) if !name.is_empty() => Self::Named(name.as_ref().to_owned()),
+            _ => return None,
+        }))
+    }
+
+    fn schema() -> Value {
+        json!({ "anyOf": [{ "type": "boolean" }, { "type": "string", "minLength": 1 }] })
+    }
+}
+
 /// A point, or an offset, in metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Vector(pub DVec3);
@@ -333,6 +445,24 @@ impl Leaf for Up {
 
     fn schema() -> Value {
         json!({ "enum": ["y", "z"] })
+    }
+}
+
+impl Leaf for Shown {
+    const EXPECTED: &'static str = "\"seen\", \"matte\", \"caster-only\" or \"shadow-only\"";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        match value.as_str()? {
+            "seen" => Some(Ok(Self::Seen)),
+            "matte" => Some(Ok(Self::Matte)),
+            "caster-only" => Some(Ok(Self::CasterOnly)),
+            "shadow-only" => Some(Ok(Self::ShadowOnly)),
+            _ => None,
+        }
+    }
+
+    fn schema() -> Value {
+        json!({ "enum": ["seen", "matte", "caster-only", "shadow-only"] })
     }
 }
 

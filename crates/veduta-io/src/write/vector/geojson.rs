@@ -6,32 +6,54 @@ use super::outline::{Point, Rounding, twice_area};
 use super::{VectorOptions, srgb8};
 use std::fmt::Write;
 use veduta::drawing::{Drawing, Evenness, Group};
+use veduta::map::MaterialId;
+use veduta_geometry::DVec2;
 
 /// GeoJSON text: a feature a line.
 pub fn encode(drawing: &Drawing, options: &VectorOptions) -> String {
     let rounding = Rounding::new(options.decimals);
     let mut text = String::from("{\"type\":\"FeatureCollection\",\"features\":[");
     let mut is_first = true;
-    for shape in &drawing.shapes {
-        let rings = rounding.rings(&shape.seen);
+    let shapes = drawing.shapes.iter().map(|shape| Feature {
+        object: path_of(&drawing.groups, shape.group),
+        material: shape.material,
+        radiance: shape.radiance,
+        opacity: 1.0,
+        evenness: shape.evenness,
+        outlines: &shape.seen,
+        more: format!(
+            "\"faces\":{},\"nearest\":{},\"farthest\":{},",
+            shape.faces, shape.nearest, shape.farthest
+        ),
+    });
+    let veils = drawing.veils.iter().map(|veil| Feature {
+        object: veil.name.clone(),
+        material: veil.material,
+        radiance: veil.radiance,
+        opacity: veil.opacity,
+        evenness: veil.evenness,
+        outlines: &veil.outlines,
+        more: String::new(),
+    });
+    for feature in shapes.chain(veils) {
+        let rings = rounding.rings(feature.outlines);
         if rings.is_empty() {
             continue;
         }
         text.push_str(if is_first { "\n" } else { ",\n" });
         is_first = false;
-        let [r, g, b] = srgb8(shape.radiance);
+        let [r, g, b] = srgb8(feature.radiance);
         // Writing to a string cannot fail.
         let _ = write!(
             text,
-            "{{\"type\":\"Feature\",\"properties\":{{\"object\":{},\"material\":{},\"faces\":{},\
-             \"color\":\"#{r:02x}{g:02x}{b:02x}\",\"color_is_mean\":{},\"nearest\":{},\
-             \"farthest\":{}}},\"geometry\":{{\"type\":\"MultiPolygon\",\"coordinates\":[",
-            serde_json::Value::from(path_of(&drawing.groups, shape.group)),
-            serde_json::Value::from(&*drawing.material_names[shape.material.index()]),
-            shape.faces,
-            shape.evenness != Evenness::Even,
-            shape.nearest,
-            shape.farthest,
+            "{{\"type\":\"Feature\",\"properties\":{{\"object\":{},\"material\":{},{}\
+             \"color\":\"#{r:02x}{g:02x}{b:02x}\",\"color_is_mean\":{},\"opacity\":{}\
+             }},\"geometry\":{{\"type\":\"MultiPolygon\",\"coordinates\":[",
+            serde_json::Value::from(feature.object),
+            serde_json::Value::from(&*drawing.material_names[feature.material.index()]),
+            feature.more,
+            feature.evenness != Evenness::Even,
+            feature.opacity,
         );
         let height = (drawing.size[1] * 10f64.powi(options.decimals.into())).round() as i64;
         for (index, polygon) in polygons(rings).iter().enumerate() {
@@ -55,6 +77,18 @@ pub fn encode(drawing: &Drawing, options: &VectorOptions) -> String {
     }
     text.push_str("\n]}\n");
     text
+}
+
+/// A shape or a veil.
+struct Feature<'a> {
+    object: String,
+    material: MaterialId,
+    radiance: [f32; 3],
+    opacity: f32,
+    evenness: Evenness,
+    outlines: &'a [Vec<DVec2>],
+    /// Properties that only shapes have.
+    more: String,
 }
 
 /// JSON wants a digit before the point.

@@ -18,7 +18,7 @@ use veduta::drawing::{Drawing, LineKind};
 /// What a drawing is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VectorFormat {
-    /// SVG 1.1: a group with id and title for each object, a path for each shape.
+    /// SVG 1.1: a group with id and title for each object, a path for each shape, the underpainting first.
     #[cfg(feature = "svg")]
     Svg,
     /// PDF 1.7: an optional content group (a layer in viewers) for each object.
@@ -88,10 +88,10 @@ pub struct VectorOptions {
 pub const MOST_DECIMALS: u8 = 9;
 
 impl Default for VectorOptions {
-    /// Thousandths of a pixel, no background, black lines of one pixel.
+    /// Hundredths of a pixel, no background, black lines of one pixel.
     fn default() -> Self {
         Self {
-            decimals: 3,
+            decimals: 2,
             background: None,
             line_width: 1.0,
             line_color: [0.0; 3],
@@ -159,6 +159,11 @@ fn srgb8(light: [f32; 3]) -> [u8; 3] {
     light.map(|channel| (srgb_from_linear(channel.clamp(0.0, 1.0)) * 255.0).round() as u8)
 }
 
+/// An opacity in thousandths.
+fn thousandths(opacity: f32) -> i64 {
+    (f64::from(opacity) * 1000.0).round() as i64
+}
+
 /// The name of a kind of lines, for groups.
 #[cfg(any(feature = "svg", feature = "pdf"))]
 fn name_of_lines(kind: LineKind) -> &'static str {
@@ -166,5 +171,14 @@ fn name_of_lines(kind: LineKind) -> &'static str {
         LineKind::Silhouette => "silhouettes",
         LineKind::Boundary => "boundaries",
         LineKind::Crease => "creases",
+        LineKind::Hidden => "hidden",
     }
+}
+
+/// Width, dash and gap of hidden lines beside others of `width`: narrow and dashed, in the proportions of
+/// ISO 128 (a dash of twelve widths, a gap of three).
+#[cfg(any(feature = "svg", feature = "pdf"))]
+fn hidden_line(width: f64) -> [f64; 3] {
+    let narrow = 0.5 * width;
+    [narrow, 12.0 * narrow, 3.0 * narrow]
 }

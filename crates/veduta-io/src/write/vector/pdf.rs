@@ -1,15 +1,17 @@
 use super::outline::{Point, Rounding};
-use super::{VectorOptions, name_of_lines, srgb8};
+use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
 use miniz_oxide::deflate::compress_to_vec_zlib;
 use pdf_writer::{Array, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
+use std::collections::BTreeSet;
 use std::fmt::Write;
-use veduta::drawing::Drawing;
+use veduta::drawing::{Drawing, LineKind, Underpainting};
+use veduta_geometry::DVec2;
 
 /// Points (1/72 inch) of a pixel, of which CSS has 96 to an inch.
 const POINTS_PER_PIXEL: f64 = 0.75;
 
 /// How hard to compress, of 10.
-const COMPRESSION: u8 = 6;
+const COMPRESSION: u8 = 9;
 
 /// A PDF of one page. Groups are optional content groups, which viewers list as layers; a part of
 /// the page within the marks of its group and of all around it shows when all of them are on.
@@ -44,6 +46,12 @@ pub fn encode(drawing: &Drawing, options: &VectorOptions) -> Vec<u8> {
         let mut properties = resources.insert(Name(b"Properties")).dict();
         for index in 0..layers.layers.len() {
             properties.pair(Name(resource_name(index).as_bytes()), layer_ref(index));
+        }
+        properties.finish();
+        let mut states = resources.ext_g_states();
+        for opacity in opacities(drawing) {
+            let mut state = states.insert(Name(state_name(opacity).as_bytes())).dict();
+            state.pair(Name(b"ca"), opacity as f32 / 1000.0);
         }
     }
     pdf.stream(stream, &compressed)
@@ -119,6 +127,17 @@ fn resource_name(layer: usize) -> String {
     format!("G{layer}")
 }
 
+/// The opacities of veils, in thousandths.
+fn opacities(drawing: &Drawing) -> BTreeSet<i64> {
+    let veils = drawing.veils.iter();
+    veils.map(|veil| thousandths(veil.opacity)).collect()
+}
+
+/// By which the page's content knows an opacity.
+fn state_name(opacity: i64) -> String {
+    format!("A{opacity}")
+}
+
 fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> String {
     let mut content = Content {
         text: String::new(),
@@ -135,6 +154,9 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
         let [width, height] = drawing.size;
         content.push(format_args!("0 0 {width} {height} re f\n"));
     }
+    if let Some(Underpainting { outlines, radiance }) = &drawing.underpainting {
+        content.shape(outlines, *radiance);
+    }
     let mut open: Vec<u32> = Vec::new();
     for (index, group) in (0u32..).zip(&drawing.groups) {
         while open.last().copied() != group.parent {
@@ -146,19 +168,14 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
         let layer = layers.push(&group.name, group.parent.map(|parent| parent as usize));
         content.begin_layer(layer);
         for shape in &drawing.shapes[group.shapes.clone()] {
-            let rings = content.rounding.rings(&shape.painted);
-            if !rings.is_empty() {
-                content.fill(srgb8(shape.radiance));
-                for ring in &rings {
-                    content.path(ring);
-                    content.text.push_str("h\n");
-                }
-                content.text.push_str("f\n");
-            }
+            content.shape(&shape.painted, shape.radiance);
         }
     }
     for _ in open {
         content.text.push_str("EMC\n");
+    }
+    if !drawing.veils.is_empty() {
+        content.veils(drawing, layers);
     }
     if !drawing.strokes.is_empty() {
         content.lines(drawing, options, layers);
@@ -186,9 +203,13 @@ impl Content {
     }
 
     fn color(&mut self, color: [u8; 3], operator: &str) {
-        // Four decimals tell each of the 256 values.
-        let [r, g, b] = color.map(|channel| f64::from(channel) / 255.0);
-        self.push(format_args!("{r:.4} {g:.4} {b:.4} {operator}\n"));
+        for channel in color {
+            // Three decimals tell each of the 256 values.
+            let value = (f64::from(channel) / 0.255).round() as i64;
+            Rounding::new(3).push(&mut self.text, value);
+            self.text.push(' ');
+        }
+        self.push(format_args!("{operator}\n"));
     }
 
     fn fill(&mut self, color: [u8; 3]) {
@@ -196,6 +217,38 @@ impl Content {
             self.fill = Some(color);
             self.color(color, "rg");
         }
+    }
+
+    fn shape(&mut self, outlines: &[Vec<DVec2>], radiance: [f32; 3]) {
+        let rings = self.rounding.rings(outlines);
+        if !rings.is_empty() {
+            self.fill(srgb8(radiance));
+            for ring in &rings {
+                self.path(ring);
+                self.text.push_str("h\n");
+            }
+            self.text.push_str("f\n");
+        }
+    }
+
+    /// In layers for each stretch of one object: their order is that of depth.
+    fn veils(&mut self, drawing: &Drawing, layers: &mut Layers) {
+        let all = layers.push("veils", None);
+        self.begin_layer(all);
+        self.text.push_str("q\n");
+        for of_object in drawing.veils.chunk_by(|a, b| a.object == b.object) {
+            let layer = layers.push(&of_object[0].name, Some(all));
+            self.begin_layer(layer);
+            for veil in of_object {
+                let name = state_name(thousandths(veil.opacity));
+                self.push(format_args!("/{name} gs\n"));
+                self.shape(&veil.outlines, veil.radiance);
+            }
+            self.text.push_str("EMC\n");
+        }
+        self.text.push_str("Q\nEMC\n");
+        // As it was before.
+        self.fill = None;
     }
 
     fn lines(&mut self, drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) {
@@ -208,6 +261,11 @@ impl Content {
         for strokes in drawing.strokes.chunk_by(|a, b| a.kind == b.kind) {
             let layer = layers.push(name_of_lines(strokes[0].kind), Some(all));
             self.begin_layer(layer);
+            let is_hidden = strokes[0].kind == LineKind::Hidden;
+            if is_hidden {
+                let [narrow, dash, gap] = hidden_line(width);
+                self.push(format_args!("q {narrow} w 0 J [{dash} {gap}] 0 d\n"));
+            }
             for stroke in strokes {
                 let (chain, end) = if stroke.closed {
                     (self.rounding.ring(&stroke.points), "s\n")
@@ -218,6 +276,9 @@ impl Content {
                     self.path(&chain);
                     self.text.push_str(end);
                 }
+            }
+            if is_hidden {
+                self.text.push_str("Q\n");
             }
             self.text.push_str("EMC\n");
         }
@@ -230,7 +291,7 @@ impl Content {
                 self.rounding.push(&mut self.text, value);
                 self.text.push(' ');
             }
-            self.text.push_str(if index == 0 { "m\n" } else { "l\n" });
+            self.text.push_str(if index == 0 { "m " } else { "l " });
         }
     }
 }

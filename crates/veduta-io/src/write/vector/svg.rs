@@ -1,8 +1,8 @@
 use super::outline::{Point, Rounding};
-use super::{VectorOptions, name_of_lines, srgb8};
+use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
 use std::collections::HashSet;
 use std::fmt::Write;
-use veduta::drawing::Drawing;
+use veduta::drawing::{Drawing, LineKind, Underpainting};
 
 /// SVG text. Groups nest as names do; a path is a shape, in relative coordinates.
 pub fn encode(drawing: &Drawing, options: &VectorOptions) -> String {
@@ -38,7 +38,18 @@ impl Svg {
                 "<rect width=\"{width}\" height=\"{height}\" fill=\"{color}\"/>\n"
             ));
         }
+        if let Some(Underpainting { outlines, radiance }) = &drawing.underpainting {
+            let rings = self.rounding.rings(outlines);
+            let id = self.id("underpainting");
+            let color = Color(srgb8(*radiance));
+            self.push(format_args!("<path id=\"{id}\" fill=\"{color}\" d=\""));
+            self.path(&rings, true);
+            self.text.push_str("\"/>\n");
+        }
         self.groups(drawing);
+        if !drawing.veils.is_empty() {
+            self.veils(drawing);
+        }
         if !drawing.strokes.is_empty() {
             self.lines(drawing, options);
         }
@@ -70,6 +81,28 @@ impl Svg {
         }
     }
 
+    /// In groups for each stretch of one object: their order is that of depth.
+    fn veils(&mut self, drawing: &Drawing) {
+        self.begin_group("veils");
+        for of_object in drawing.veils.chunk_by(|a, b| a.object == b.object) {
+            self.begin_group(&of_object[0].name);
+            for veil in of_object {
+                let rings = self.rounding.rings(&veil.outlines);
+                if !rings.is_empty() {
+                    let color = Color(srgb8(veil.radiance));
+                    let opacity = thousandths(veil.opacity);
+                    self.push(format_args!("<path fill=\"{color}\" fill-opacity=\""));
+                    Rounding::new(3).push(&mut self.text, opacity);
+                    self.text.push_str("\" d=\"");
+                    self.path(&rings, true);
+                    self.text.push_str("\"/>\n");
+                }
+            }
+            self.text.push_str("</g>\n");
+        }
+        self.text.push_str("</g>\n");
+    }
+
     fn lines(&mut self, drawing: &Drawing, options: &VectorOptions) {
         let id = self.id("lines");
         let (color, width) = (Color(srgb8(options.line_color)), options.line_width);
@@ -78,7 +111,18 @@ impl Svg {
              stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
         ));
         for strokes in drawing.strokes.chunk_by(|a, b| a.kind == b.kind) {
-            self.begin_group(name_of_lines(strokes[0].kind));
+            let name = name_of_lines(strokes[0].kind);
+            if strokes[0].kind == LineKind::Hidden {
+                let id = self.id(name);
+                let [narrow, dash, gap] = hidden_line(width);
+                self.push(format_args!(
+                    "<g id=\"{id}\" stroke-width=\"{narrow}\" stroke-dasharray=\"{dash} {gap}\" \
+                     stroke-linecap=\"butt\">"
+                ));
+                self.title(name);
+            } else {
+                self.begin_group(name);
+            }
             for stroke in strokes {
                 let chain = if stroke.closed {
                     self.rounding.ring(&stroke.points)

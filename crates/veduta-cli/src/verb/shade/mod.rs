@@ -1,14 +1,17 @@
 //! `veduta shade`: pixels of a stored map, at any scale and in other colours.
 
+mod into;
+
 use super::look::Look;
 use super::output::{Output, Target};
-use super::stored::{Changes, Stored, open, tell_work};
+use super::stored::{Changes, Stored, Trust, laid_on, open, refuse_filter_of_guests, tell_work};
 use super::vector::{Subject, Vector};
 use super::{tell_of_mattes, tell_shortcomings};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::Args;
+use into::Into;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use veduta::dice::PixelGrid;
@@ -48,6 +51,10 @@ pub struct Shade {
     strict: bool,
 
     #[command(flatten)]
+    local: Into,
+    #[command(flatten)]
+    trust: Trust,
+    #[command(flatten)]
     changes: Changes,
     #[command(flatten)]
     output: Output,
@@ -65,6 +72,13 @@ Examples:
       veduta shade town.veduta --scale 4 -o large.png
   A part of it, as through a magnifying glass:
       veduta shade town.veduta --scale 9 --window 3000,2000,320,240 -o part.png
+  Some objects anew, in a picture that is there:
+      veduta shade town.veduta -o a.exr
+      veduta shade town.veduta --unlit --into a.exr --objects wall -o b.exr
+  Before what another map shows, however near that is:
+      veduta render hut.obj --eye 9,-9,5 --look-at 0,0,0 -o far.veduta
+      veduta render town.obj --eye 9,-9,5 --look-at 0,0,0 -o near.veduta
+      veduta shade near.veduta --background far.veduta -o before.png
   For deep compositing, all that is seen in each pixel:
       veduta shade town.veduta -o town-deep.exr --deep
   With what was red in another colour:
@@ -85,6 +99,11 @@ impl Shade {
                 if settings.lines.contains(&LineKind::Boundary) {
                     let message = "a map holds the faces that are seen, so that it cannot tell which \
                         edges have a single one; draw boundaries by veduta render";
+                    return Err(Failure::new(Code::Usage, message));
+                }
+                if settings.lines.contains(&LineKind::Hidden) {
+                    let message = "a map holds the faces that are seen, and hidden lines are edges of \
+                        others too; draw them by veduta render";
                     return Err(Failure::new(Code::Usage, message));
                 }
                 Some((target, settings))
@@ -110,6 +129,16 @@ impl Shade {
             let message = "a map is shown by -o FILE; --preview is for veduta render";
             return Err(Failure::new(Code::Usage, message));
         }
+        if let Some(old) = &self.local.into {
+            let target = match &pixels {
+                Some(target) if !self.deep => target,
+                _ => {
+                    let message = "a vector or deep picture is made as a whole; leave --into out";
+                    return Err(Failure::new(Code::Usage, message));
+                }
+            };
+            return self.run_into(old, target, json, talk);
+        }
         if vector.is_some() && self.deep {
             let message = "a deep picture is stored as .exr; leave --deep out";
             return Err(Failure::new(Code::Usage, message));
@@ -131,7 +160,20 @@ impl Shade {
             [DVec2::ZERO, corner].map(|pixels| grid.image_from_pixels(pixels))
         };
         let mut seen = match map.reader().sub_scanlines_per_row() {
-            None => Stored::Regions(map.read(|reader| reader.read_window(window(&reached)))?),
+            None => {
+                let seen = map.read(|reader| reader.read_window(window(&reached)))?;
+                let seen = laid_on(seen, &self.look, self.trust, |reader| {
+                    reader.read_window(window(&reached))
+                })?;
+                if !seen.guests.is_empty() && (vector.is_some() || self.deep) {
+                    let message = format!(
+                        "{}: holds pictures of other programs, which are laid into flat pixels only",
+                        self.map.display()
+                    );
+                    return Err(Failure::new(Code::Unsupported, message));
+                }
+                Stored::Regions(seen)
+            }
             Some(_) if vector.is_some() || self.deep => {
                 let message = format!(
                     "{}: holds spans on sub-scanlines; vector and deep pictures are made of regions, \
@@ -140,7 +182,11 @@ impl Shade {
                 );
                 return Err(Failure::new(Code::Usage, message));
             }
-            Some(_) => Stored::read(&mut map)?,
+            Some(_) => {
+                let why = "spans on sub-scanlines have no regions before a map as background";
+                self.look.refuse_background_map_of(why)?;
+                Stored::read(&mut map)?
+            }
         };
         let bytes_read = map.reader().bytes_read();
         self.changes.apply(seen.scene_mut(), self.strict, talk)?;
@@ -187,19 +233,11 @@ impl Shade {
     }
 
     /// The pixels to make of a map whose picture has `size`.
-    fn grid(&self, [width, height]: [u32; 2]) -> Result<PixelGrid, Failure> {
-        let frame = match self.size {
-            Some(size) => DVec2::new(size.width.into(), size.height.into()),
-            None => DVec2::new(width.into(), height.into()) * self.scale.unwrap_or(DVec2::ONE),
-        };
+    fn grid(&self, of_map: [u32; 2]) -> Result<PixelGrid, Failure> {
+        let frame = self.frame(of_map);
         let (origin, size) = match self.window {
             Some(window) => (window.left_top, window.size),
-            None => {
-                let pixels = frame.round().max(DVec2::ONE);
-                let size = Size::new(pixels.x as u64, pixels.y as u64);
-                let size = size.map_err(|problem| Failure::new(Code::Usage, problem))?;
-                (DVec2::ZERO, size)
-            }
+            None => (DVec2::ZERO, whole_size(frame)?),
         };
         Ok(PixelGrid {
             width: size.width,
@@ -226,6 +264,7 @@ impl Shade {
             self.look
                 .refuse_filter("filters weigh exact regions, not spans")?;
         }
+        refuse_filter_of_guests(&self.map, seen, &self.look)?;
         let (aovs, filter) = (self.output.aovs(), self.look.filter());
         let picture = seen.picture(grid, self.look.unlit, filter, aovs);
         let (mut picture, aovs) = picture.map_err(|error| {
@@ -251,4 +290,20 @@ impl Shade {
             "exposure": ev,
         }))
     }
+
+    /// Width and height of the frame in pixels, with fractions.
+    fn frame(&self, of_map: [u32; 2]) -> DVec2 {
+        let [width, height] = of_map.map(f64::from);
+        match self.size {
+            Some(size) => DVec2::new(size.width.into(), size.height.into()),
+            None => DVec2::new(width, height) * self.scale.unwrap_or(DVec2::ONE),
+        }
+    }
+}
+
+/// The size of a picture that shows all of a frame.
+fn whole_size(frame: DVec2) -> Result<Size, Failure> {
+    let pixels = frame.round().max(DVec2::ONE);
+    let size = Size::new(pixels.x as u64, pixels.y as u64);
+    size.map_err(|problem| Failure::new(Code::Usage, problem))
 }
