@@ -121,13 +121,13 @@ fn share_out(faces: &mut [FaceId], boxes: &[Box2], take: &mut impl FnMut(&mut [F
         faces.select_nth_unstable_by(first, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
     };
     let mut parted = faces.to_vec();
-    let mut bytes_read = |way: (&dyn Fn(FaceId) -> f64, usize)| {
+    let bytes_read = |way: (&dyn Fn(FaceId) -> f64, usize)| {
         part(&mut parted, way);
         let (first, second) = parted.split_at(way.1);
         let read = |faces: &[FaceId]| faces.len() as f64 * around(faces, boxes).exposure();
         read(first) + read(second)
     };
-    let costs = ways.map(|way| bytes_read(way));
+    let costs = ways.map(bytes_read);
     let best = (0..ways.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b]));
     let way = ways[best.expect("there are some")];
     drop(parted);
