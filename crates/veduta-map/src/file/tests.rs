@@ -556,8 +556,8 @@ fn a_window_reads_the_bands_of_guests_that_lie_in_it() {
 }
 
 #[test]
-fn a_file_of_version_1_0_is_read() {
-    // What such a file lacks in its manifest.
+fn a_manifest_without_guests_holes_and_ways_to_be_shown_is_read() {
+    // What a file of version 1.0 lacks in its manifest.
     let manifest = written(&SeenScene {
         guests: Vec::new(),
         has_holes: false,
