@@ -618,7 +618,8 @@ impl SeenRows {
                 return Err(misfit("its outline is not a polygon"));
             }
             // The table would turn it, and its sides would be others.
-            if !(veduta_geometry::signed_area(&row.outline) > 0.0) {
+            let area = veduta_geometry::signed_area(&row.outline);
+            if area.is_nan() || area <= 0.0 {
                 return Err(misfit("its outline has no area or is not wound clockwise"));
             }
             let object = ObjectId(row.object);

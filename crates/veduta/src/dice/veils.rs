@@ -195,7 +195,7 @@ impl<D: Diced> Pixel<'_, D> {
         } = &mut *self.buffers;
         let diced = &mut *self.diced;
         if layers.len() > MOST_QUARTERED || sort(layers, &Extent::UNIT_SQUARE) {
-            cutter.from_the_front(layers, points, &Extent::UNIT_SQUARE, |part, seen| {
+            cutter.take_from_front(layers, points, &Extent::UNIT_SQUARE, |part, seen| {
                 diced.set_measure(part as usize, seen);
             });
             for &(_, row) in opaque {
@@ -278,7 +278,7 @@ struct Cutter {
 impl Cutter {
     /// Takes sorted layers one after the other, and tells `seen` of each part; leaves in the regions what
     /// they let through.
-    fn from_the_front<M: Measure>(
+    fn take_from_front<M: Measure>(
         &mut self,
         layers: &[Layer<M>],
         points: &[DVec2],
@@ -346,7 +346,7 @@ impl Cutter {
             return;
         }
         if depth == QUARTERINGS {
-            self.from_the_front(layers, points, cell, &mut *seen);
+            self.take_from_front(layers, points, cell, &mut *seen);
             for (row, polygon) in surfaces {
                 seen(*row, self.regions.through(&points[polygon.clone()]));
             }
@@ -372,7 +372,7 @@ impl Cutter {
             let clipped = clipped.map(|(row, range)| (*row, quarter.clip(points, range.clone())));
             let clipped: Vec<(u32, Range<usize>)> = clipped.collect();
             if sort(&mut inside, &quarter) {
-                self.from_the_front(&inside, points, &quarter, &mut *seen);
+                self.take_from_front(&inside, points, &quarter, &mut *seen);
                 for (row, polygon) in &clipped {
                     seen(*row, self.regions.through(&points[polygon.clone()]));
                 }
@@ -704,7 +704,7 @@ mod tests {
             let mut cutter = Cutter::default();
             let count = layers.len();
             let in_order = sums(count, |seen| {
-                cutter.from_the_front(&layers, &points, &Extent::UNIT_SQUARE, seen);
+                cutter.take_from_front(&layers, &points, &Extent::UNIT_SQUARE, seen);
             });
             let by_all = sums(count, |mut seen| {
                 cutter.each_by_all(&layers, &points, &[], &mut seen)
