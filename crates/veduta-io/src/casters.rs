@@ -168,12 +168,16 @@ fn options(reading: &Reading, file: &Path) -> Result<ReadOptions, CastersError> 
         file: file.to_owned(),
         what: what.clone(),
     };
-    let mut options = ReadOptions::default();
-    options.up_axis = match reading.up_axis.as_deref() {
+    let up_axis = match reading.up_axis.as_deref() {
         None => None,
         Some("y") => Some(UpAxis::Y),
         Some("z") => Some(UpAxis::Z),
         Some(other) => return Err(unknown(&other.to_owned())),
+    };
+    #[cfg_attr(not(feature = "cityjson"), expect(unused_mut))]
+    let mut options = ReadOptions {
+        up_axis,
+        ..ReadOptions::default()
     };
     if let Some(level) = &reading.level_of_detail {
         #[cfg(feature = "cityjson")]

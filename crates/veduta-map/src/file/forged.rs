@@ -448,11 +448,14 @@ fn forge_value(array: &ArrayRef, row: usize, random: &mut Random) -> Option<Arra
     })
 }
 
+/// What a forger does to a manifest.
+type Forgery = fn(&mut Manifest);
+
 #[test]
 fn forged_manifests_are_refused_or_read() {
     for (name, sound) in sound_files() {
         let sound = Parts::of(&sound);
-        let forgeries: [(&str, fn(&mut Manifest)); 22] = [
+        let forgeries: [(&str, Forgery); 22] = [
             ("no materials", |m| m.materials.clear()),
             ("an image beyond", |m| {
                 for texture in m
@@ -464,7 +467,9 @@ fn forged_manifests_are_refused_or_read() {
                 }
             }),
             ("objects beyond", |m| m.layers[0].objects = 0..u32::MAX),
-            ("objects backwards", |m| m.layers[0].objects = 1..0),
+            ("objects backwards", |m| {
+                m.layers[0].objects = std::ops::Range { start: 1, end: 0 };
+            }),
             ("no tiles", |m| m.tiles.clear()),
             ("a tile more", |m| m.tiles.push([0.0; 4])),
             ("no pixels", |m| m.size = [0, 7]),

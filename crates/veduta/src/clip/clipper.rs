@@ -166,7 +166,7 @@ impl Clipper<'_> {
         // Behind all, so that nothing is passed over for its depth.
         let extent = Extent {
             nearness: [f32::NEG_INFINITY; 2],
-            ..extents[face.index()].clone()
+            ..extents[face.index()]
         };
         let stamp = face.0 + 1;
         grid.each_row(outline, &extent, |row, columns| {

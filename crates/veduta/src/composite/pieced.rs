@@ -23,12 +23,15 @@ struct Origin {
     sides: Option<Vec<Side>>,
 }
 
+/// Face, map, and of a map with holes the fragment: whether of a veil, and which. A face of a map without holes
+/// has one row.
+type Row = (FaceId, usize, Option<(bool, usize)>);
+
 impl Pieced {
     /// Makes faces of the fragments of the maps of which `has_holes` says so. The others' stay, less the
     /// faces that they do not show or name.
     pub fn new(faces: &Faces, maps: &[Seen], has_holes: &[bool]) -> Self {
-        // (face, map, fragment); a face of a map without holes has one row, without a fragment.
-        let mut rows: Vec<(FaceId, usize, Option<(bool, usize)>)> = Vec::new();
+        let mut rows: Vec<Row> = Vec::new();
         for (index, map) in maps.iter().enumerate() {
             for (is_veil, fragments) in [(false, &map.opaque), (true, &map.veils)] {
                 for (number, fragment) in fragments.iter().enumerate() {
