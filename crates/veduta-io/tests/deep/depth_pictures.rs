@@ -66,6 +66,7 @@ pub fn sound_files() -> Vec<(String, Vec<u8>)> {
             let mut layer = layer("", channels);
             layer.encoding.compression = compression;
             layer.encoding.blocks = blocks;
+            layer.encoding.line_order = LineOrder::Increasing;
             let mut image = Image::from_layer(layer);
             let [world_to_camera, world_to_ndc] = matrices_of_camera(&camera());
             let attributes = &mut image.layer_data.attributes;
