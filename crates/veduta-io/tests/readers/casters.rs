@@ -244,7 +244,7 @@ fn layers_and_objects_that_were_left_out_cast_nothing() {
     let reading = Reading {
         layers: Some(vec!["parts".into(), "mesh".into()]),
         choices: vec![Choice {
-            only: vec!["parts/**".into(), "mesh".into()],
+            only: vec!["parts/**".into(), "mesh/**".into()],
             without: vec!["**/under".into()],
         }],
         ..reading_of(loaded.files, &ReadOptions::default())
