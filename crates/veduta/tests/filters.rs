@@ -4,6 +4,7 @@
 //! A metre is a pixel here: scenes are seen from above, in parallel, with the frame's top left corner at
 //! x = 0, y = 0 and y downwards, so that world and pixel coordinates differ in the sign of y alone.
 
+use panes::{Pane, scene_of};
 use rng::Rng;
 use veduta::accumulate::{AovSettings, Picture};
 use veduta::dice::PixelGrid;
@@ -11,13 +12,14 @@ use veduta::filter::Filter;
 use veduta::geometry::{DMat4, DVec2, DVec3, Vec2};
 use veduta::map::{Camera, MaterialId, Projection};
 use veduta::pipeline::{self, RenderSettings, find_visibility, render_channels};
-use veduta::scene::{
-    AlphaMode, Image, ImageId, Material, Mesh, MeshId, Object, Scene, TextureRef, generate,
-};
+use veduta::scene::{Image, ImageId, Material, Mesh, MeshId, Object, Scene, TextureRef, generate};
 
 #[path = "support/rng.rs"]
 #[allow(dead_code)]
 mod rng;
+
+#[path = "support/panes.rs"]
+mod panes;
 
 const WIDE: [Filter; 5] = [
     Filter::Triangle,
@@ -55,13 +57,6 @@ fn kernel(filter: Filter, x: f64) -> f64 {
     }
 }
 
-/// A triangle or another convex polygon with one colour and opacity, shown as it is.
-#[derive(Clone, Debug)]
-struct Pane {
-    corners: Vec<DVec3>,
-    color: [f32; 4],
-}
-
 impl Pane {
     /// A rectangle in the plane z = 0, in pixels.
     fn rectangle(left: f64, top: f64, right: f64, bottom: f64, color: [f32; 3]) -> Self {
@@ -86,32 +81,6 @@ impl Pane {
             color: [r, g, b, if veils { opacity } else { 1.0 }],
         }
     }
-}
-
-fn scene_of(panes: &[Pane]) -> Scene {
-    let mut scene = Scene::default();
-    for (index, pane) in panes.iter().enumerate() {
-        let fans = (2..pane.corners.len() as u32).map(|k| [0, k - 1, k]);
-        scene.meshes.push(Mesh {
-            positions: pane.corners.clone(),
-            triangles: fans.collect(),
-            fans: vec![0],
-            materials: vec![(0, MaterialId(index as u32))],
-            ..Mesh::default()
-        });
-        scene.objects.push(Object {
-            name: format!("pane {index:03}"),
-            mesh: MeshId(index as u32),
-            world_from_object: DMat4::IDENTITY,
-        });
-        scene.materials.push(Material {
-            base_color: pane.color,
-            alpha_mode: AlphaMode::Blend,
-            unlit: true,
-            ..Material::default()
-        });
-    }
-    scene
 }
 
 fn camera(width: u32, height: u32) -> Camera {

@@ -1,18 +1,22 @@
 //! Veils, faces that are not fully opaque: what a picture shows through them.
 
+use panes::{Pane, scene_of};
 use rng::Rng;
 use veduta::accumulate::{AovSettings, Picture};
 use veduta::composite::composite;
 use veduta::dice::PixelGrid;
 use veduta::filter::Filter;
-use veduta::geometry::{DMat4, DVec2, DVec3, Vec2};
-use veduta::map::{Camera, MaterialId, Projection, SeenScene};
+use veduta::geometry::{DVec2, DVec3, Vec2};
+use veduta::map::{Camera, Projection, SeenScene};
 use veduta::pipeline::{self, RenderSettings};
-use veduta::scene::{AlphaMode, Image, ImageId, Material, Mesh, MeshId, Object, Scene, TextureRef};
+use veduta::scene::{AlphaMode, Image, ImageId, Material, Scene, TextureRef};
 
 #[path = "support/rng.rs"]
 #[allow(dead_code)]
 mod rng;
+
+#[path = "support/panes.rs"]
+mod panes;
 
 const WIDTH: u32 = 12;
 const HEIGHT: u32 = 9;
@@ -25,39 +29,6 @@ fn camera() -> Camera {
     };
     let eye = DVec3::new(0.0, -4.0, 0.0);
     Camera::looking(eye, DVec3::ZERO, DVec3::Z, projection, 0.1).expect("a sound camera")
-}
-
-/// A polygon with one colour and opacity, shown as it is.
-#[derive(Clone, Debug)]
-struct Pane {
-    corners: Vec<DVec3>,
-    color: [f32; 4],
-}
-
-fn scene_of(panes: &[Pane]) -> Scene {
-    let mut scene = Scene::default();
-    for (index, pane) in panes.iter().enumerate() {
-        let fans = (2..pane.corners.len() as u32).map(|k| [0, k - 1, k]);
-        scene.meshes.push(Mesh {
-            positions: pane.corners.clone(),
-            triangles: fans.collect(),
-            fans: vec![0],
-            materials: vec![(0, MaterialId(index as u32))],
-            ..Mesh::default()
-        });
-        scene.objects.push(Object {
-            name: format!("pane {index:03}"),
-            mesh: MeshId(index as u32),
-            world_from_object: DMat4::IDENTITY,
-        });
-        scene.materials.push(Material {
-            base_color: pane.color,
-            alpha_mode: AlphaMode::Blend,
-            unlit: true,
-            ..Material::default()
-        });
-    }
-    scene
 }
 
 fn random_panes(rng: &mut Rng, count: u32) -> Vec<Pane> {

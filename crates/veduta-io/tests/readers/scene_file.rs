@@ -604,7 +604,7 @@ const MISTAKES: &[(&str, &str, ErrorKind, &str)] = &[
         "model =",
         "path =",
         ErrorKind::BadInput,
-        ":10:1: unknown key \"path\" in [[layer]]; it may have name, model, up, lod, at, priority, instances",
+        ":10:1: unknown key \"path\" in [[layer]]; it may have name, model, up, lod, at, keys, interpolation, animation, repeat, priority, shown, instances",
     ),
     (
         "[camera.c]",
@@ -949,7 +949,9 @@ fn an_axis_asked_for_on_the_whole_is_not_silently_ignored() {
         panic!("{:?}", loaded.warnings);
     };
     assert!(
-        warning.to_string().contains("they have `up` and `lod`"),
+        warning
+            .to_string()
+            .contains("they have `up`, `lod` and `animation`"),
         "{warning}"
     );
     let text = format!("{LAYER}[[layer]]\nname = \"b\"\nmodel = \"in.toml\"\nup = \"y\"\n");

@@ -26,7 +26,7 @@ fn rich() -> Value {
             "c": { "eye": [0, 0, 9], "look_at": [0, 0, 0], "parallel": 4 },
         },
         "layer": [
-            { "name": "one", "model": "part.obj", "up": "z", "priority": 2, "at": {
+            { "name": "one", "model": "part.obj", "up": "z", "priority": 2, "shown": "matte", "at": {
                 "translate": [1, 2, 3], "rotate": { "axis": [0, 0, 1], "angle": "30deg" },
                 "scale": [1, 2, 1] } },
             { "name": "two", "model": "plain.obj", "instances": "t.csv",
