@@ -38,7 +38,7 @@ pub struct StoredTimes {
     pub window: f64,
     /// Share of the fragments that touch that window.
     pub in_window: f64,
-    /// Pixels of a map that was just made, at [`ZOOM`] times the size.
+    /// Pixels of a map that was just made, at `ZOOM` times the size.
     pub pixels: f64,
     /// Pixels of the stored map at that scale.
     pub zoom: f64,

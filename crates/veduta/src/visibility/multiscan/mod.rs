@@ -5,7 +5,7 @@
 //! of Tanaka & Takahashi (1991), who count what exactness costs in sub-scanlines.
 //!
 //! 1. `scan` finds the faces that cross each sub-scanline, sorted by their left ends;
-//! 2. [`sweep`](crate::sweep) runs along a sub-scanline and keeps the nearest face, switching where two
+//! 2. `sweep` runs along a sub-scanline and keeps the nearest face, switching where two
 //!    pierce;
 //! 3. [`picture`] sums spans to pixels, eq. (1) to (6), as they are or scaled by [`Spans::on_grid`],
 //!    eq. (7).

@@ -1,15 +1,15 @@
 //! The main engine: guess with a z-buffer, clip exactly, verify, mend.
 //!
-//! 1. [`guess`]: a coarse z-buffer tells, for each cell of the frame, how near the nearest surface
+//! 1. `guess`: a coarse z-buffer tells, for each cell of the frame, how near the nearest surface
 //!    about is. It only *guesses* what is hidden.
 //! 2. `clip::cells`: faces that are not guessed to be hidden everywhere become candidates, and are
 //!    listed in the cells in which they may be seen.
 //! 3. `clip`: each candidate is clipped exactly by the nearer candidates that overlap it; where
 //!    planes cross, by one more line. Most seen faces are seen whole and need no cut. The cost does
 //!    not depend on any resolution.
-//! 4. [`verify`]: the guess is proved from the result: in each cell where something was guessed to
+//! 4. `verify`: the guess is proved from the result: in each cell where something was guessed to
 //!    be hidden, what was found seen must leave no gap and be nearer.
-//! 5. [`mend`]: where it was wrong, the faces that it hid are admitted and taken from what
+//! 5. `mend`: where it was wrong, the faces that it hid are admitted and taken from what
 //!    was found, there and nowhere else, until every cell is proved.
 //!
 //! Without the guess ([`Settings::guess`]) every face is a candidate everywhere and nothing needs to
