@@ -21,8 +21,8 @@
 
 use super::place::PixelClip;
 use super::tidy::{Sample, Tidier, cut_at};
-use super::veils::{Extent, Regions, keep};
-use super::{Part, Parts, PixelGrid, Run};
+use super::veils::{Extent, Regions, keep, part_before};
+use super::{Part, Parts, PixelGrid, push_run};
 use std::ops::Range;
 use veduta_geometry::{Affine, DVec2, signed_area};
 use veduta_map::{Camera, FaceId, Guest, Projection, VisibilityMap};
@@ -100,14 +100,7 @@ impl Surface {
     /// What of this one's `polygon` lies before another surface; of equal planes the smaller face does.
     fn part_before(&self, other: &Self, polygon: &[DVec2], kept: &mut Vec<DVec2>) {
         let difference = self.plane.minus(&other.plane);
-        if polygon.iter().any(|&p| difference.at(p) != 0.0) {
-            keep(polygon, |p| difference.at(p), kept);
-            return;
-        }
-        kept.clear();
-        if self.face < other.face {
-            kept.extend_from_slice(polygon);
-        }
+        part_before(&difference, self.face < other.face, polygon, kept);
     }
 }
 
@@ -244,16 +237,6 @@ impl<'a> GuestDicer<'a> {
     }
 }
 
-fn push_run(runs: &mut Vec<Run>, fragment: u32, pixels: Range<u32>) {
-    if !pixels.is_empty() {
-        runs.push(Run {
-            pixel: pixels.start,
-            length: pixels.end - pixels.start,
-            fragment,
-        });
-    }
-}
-
 /// Up to so many veils in a pixel are cut by one another and by samples. The work grows with the fourth
 /// power of their number.
 const MOST_VEILS: usize = 16;
@@ -287,15 +270,10 @@ impl GuestBuffers {
             self.points.extend_from_slice(polygon);
             let face = map.face_of(part.fragment as usize);
             let nearness = map.faces.face_nearness(face);
-            let scale = grid.pixels_per_frame;
             self.surfaces.push(Surface {
                 part: row,
                 face,
-                plane: Affine::new(
-                    nearness.a / scale.x,
-                    nearness.b / scale.y,
-                    nearness.at(grid.image_from_pixels(corner)),
-                ),
+                plane: grid.affine_in_pixels(nearness, corner),
                 opacity: veil.map_or(1.0, |veil| f64::from(opacities[veil])),
                 is_veil: veil.is_some(),
                 area: f64::from(part.area),

@@ -129,32 +129,18 @@ pub fn dice<D: Diced>(
     for &fragment in opaque {
         let polygon = dicer.placer.place(map, grid, fragment);
         let veiled = &dicer.veiled;
-        let push_run = |columns: Range<u32>, row: u32, diced: &mut D| {
-            if !columns.is_empty() {
-                diced.parts_mut().runs.push(Run {
-                    pixel: index_of(columns.start, row),
-                    length: columns.end - columns.start,
-                    fragment,
-                });
-            }
-        };
         let visit = |cells: Cells<(D::Measure, Vec2)>| match cells {
             Cells::Boundary { column, row, area } => {
                 let part = Part::new(index_of(column, row), fragment, &area);
                 diced.push(part, area.0);
             }
-            Cells::Inside { row, columns } if veiled.is_empty() => push_run(columns, row, diced),
             Cells::Inside { row, columns } => {
-                let mut start = columns.start;
-                for column in columns.clone() {
-                    let pixel = index_of(column, row);
-                    if veiled[pixel as usize] {
-                        push_run(start..column, row, diced);
-                        diced.push(Part::whole(pixel, fragment), D::Measure::whole());
-                        start = column + 1;
-                    }
+                let pixels = index_of(columns.start, row)..index_of(columns.end, row);
+                if veiled.is_empty() {
+                    push_run(&mut diced.parts_mut().runs, fragment, pixels);
+                } else {
+                    push_between_veils(diced, fragment, pixels, veiled);
                 }
-                push_run(start..columns.end, row, diced);
             }
         };
         let finder = &mut dicer.finder;
@@ -168,6 +154,32 @@ pub fn dice<D: Diced>(
         );
     }
     diced.append(&mut dicer.veils);
+}
+
+/// Adds a run of pixels, if there are any.
+fn push_run(runs: &mut Vec<Run>, fragment: u32, pixels: Range<u32>) {
+    if !pixels.is_empty() {
+        runs.push(Run {
+            pixel: pixels.start,
+            length: pixels.end - pixels.start,
+            fragment,
+        });
+    }
+}
+
+/// Adds pixels that a fragment fills: those that a veil touches one by one, the others in runs. Not
+/// inlined, since few bands have veils and all go through what calls it.
+#[inline(never)]
+fn push_between_veils<D: Diced>(diced: &mut D, fragment: u32, pixels: Range<u32>, veiled: &[bool]) {
+    let mut start = pixels.start;
+    for pixel in pixels.clone() {
+        if veiled[pixel as usize] {
+            push_run(&mut diced.parts_mut().runs, fragment, start..pixel);
+            diced.push(Part::whole(pixel, fragment), D::Measure::whole());
+            start = pixel + 1;
+        }
+    }
+    push_run(&mut diced.parts_mut().runs, fragment, start..pixels.end);
 }
 
 impl Part {

@@ -1,4 +1,4 @@
-use veduta_geometry::DVec2;
+use veduta_geometry::{Affine, DVec2};
 
 /// A grid of pixels on the image plane.
 ///
@@ -75,6 +75,13 @@ impl PixelGrid {
     #[inline(always)]
     pub fn image_from_pixels(&self, pixels: DVec2) -> DVec2 {
         (pixels + self.origin) / self.pixels_per_frame
+    }
+
+    /// An affine function of the image plane as one of pixel coordinates from `corner` on.
+    pub fn affine_in_pixels(&self, function: &Affine, corner: DVec2) -> Affine {
+        let DVec2 { x, y } = self.pixels_per_frame;
+        let at_corner = function.at(self.image_from_pixels(corner));
+        Affine::new(function.a / x, function.b / y, at_corner)
     }
 
     /// Number of pixels.

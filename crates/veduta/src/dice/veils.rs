@@ -166,15 +166,10 @@ impl<D: Diced> Pixel<'_, D> {
             }
             let face = map.face_of(fragment as usize);
             let nearness = map.faces.face_nearness(face);
-            let scale = grid.pixels_per_frame;
             layers.push(Layer {
                 part: row,
                 face,
-                plane: Affine::new(
-                    nearness.a / scale.x,
-                    nearness.b / scale.y,
-                    nearness.at(grid.image_from_pixels(self.corner)),
-                ),
+                plane: grid.affine_in_pixels(nearness, self.corner),
                 opacity,
                 measure,
                 start,
@@ -315,7 +310,8 @@ impl Cutter {
             regions.begin(layer.polygon(points));
             for other in layers.iter().filter(|other| other.face != layer.face) {
                 let difference = other.plane.minus(&layer.plane);
-                part_before(other, layer, &difference, other.polygon(points), front);
+                let polygon = other.polygon(points);
+                part_before(&difference, other.wins_tie(layer), polygon, front);
                 if front.len() >= 3 {
                     regions.cut::<f64>(front, &Extent::of(front), other.opacity);
                 }
@@ -384,23 +380,22 @@ impl Cutter {
     }
 }
 
-/// What of the polygon of `other` lies before the plane of `layer`: where the difference of their
-/// planes is positive.
-fn part_before<M>(
-    other: &Layer<M>,
-    layer: &Layer<M>,
+/// What of `polygon`, which lies in one plane, is before another: where the difference of the two is
+/// positive, and in all of it where they are the same and `wins_tie`.
+pub(super) fn part_before(
     difference: &Affine,
+    wins_tie: bool,
     polygon: &[DVec2],
     kept: &mut Vec<DVec2>,
 ) {
-    kept.clear();
-    if polygon.iter().all(|&p| difference.at(p) == 0.0) {
-        if other.wins_tie(layer) {
-            kept.extend_from_slice(polygon);
-        }
+    if polygon.iter().any(|&p| difference.at(p) != 0.0) {
+        keep(polygon, |p| difference.at(p), kept);
         return;
     }
-    keep(polygon, |p| difference.at(p), kept);
+    kept.clear();
+    if wins_tie {
+        kept.extend_from_slice(polygon);
+    }
 }
 
 /// Smallest rectangle around a polygon.
