@@ -18,6 +18,8 @@
 mod casters;
 #[cfg(feature = "exr")]
 pub mod deep_exr;
+#[cfg(any(feature = "exr", feature = "pdf"))]
+mod deflate;
 #[cfg(feature = "exr")]
 pub mod depth_picture;
 #[cfg(feature = "exr")]

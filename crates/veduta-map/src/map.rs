@@ -123,12 +123,37 @@ impl VisibilityMap {
     /// On the border between fragments it is the first of them. Takes time in proportion to the number
     /// of fragments.
     pub fn opaque_at(&self, image: DVec2) -> Option<usize> {
-        self.opaque.iter().position(|fragment| {
-            let polygon = self.polygon(fragment);
-            (0..polygon.len()).all(|k| {
-                let (from, to) = (polygon[k], polygon[(k + 1) % polygon.len()]);
-                veduta_geometry::cross(to - from, image - from) >= 0.0
-            })
+        let mut fragments = self.opaque.iter();
+        fragments.position(|fragment| self.contains(fragment, image))
+    }
+
+    /// The veils that what is opaque at a point of the image plane is seen through, nearest first: indices
+    /// into [`VisibilityMap::veils`], of each face one. Of veils that are as near the smaller face comes first.
+    ///
+    /// Takes time in proportion to the number of fragments.
+    pub fn veils_at(&self, image: DVec2) -> Vec<usize> {
+        let fragments = self.veils.iter().enumerate();
+        let mut found: Vec<usize> = fragments
+            .filter(|&(_, fragment)| self.contains(fragment, image))
+            .map(|(index, _)| index)
+            .collect();
+        // On the border between fragments of a face both hold the point.
+        found.dedup_by_key(|&mut index| self.veils.face(index));
+        found.sort_by(|&one, &other| {
+            let [one, other] = [one, other].map(|index| self.veils.face(index));
+            let nearness = |face| self.faces.face_nearness(face).at(image);
+            nearness(other)
+                .total_cmp(&nearness(one))
+                .then(one.cmp(&other))
+        });
+        found
+    }
+
+    fn contains(&self, fragment: Fragment, image: DVec2) -> bool {
+        let polygon = self.polygon(fragment);
+        (0..polygon.len()).all(|k| {
+            let (from, to) = (polygon[k], polygon[(k + 1) % polygon.len()]);
+            veduta_geometry::cross(to - from, image - from) >= 0.0
         })
     }
 

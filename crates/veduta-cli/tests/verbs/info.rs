@@ -33,6 +33,50 @@ fn a_pick_tells_object_face_material_and_place() {
 }
 
 #[test]
+fn a_pick_tells_what_is_looked_through_nearest_first() {
+    let folder = Folder::new();
+    let materials =
+        "newmtl red\nKd 1 0 0\nnewmtl smoke\nKd 0 0 0\nd 0.5\nnewmtl glass\nKd 1 1 1\nd 0.25\n";
+    folder.write("panes.mtl", materials);
+    let square = |material: &str, z: u32, first: u32| {
+        let corners: Vec<u32> = (first..first + 4).collect();
+        format!(
+            "o {material}\nusemtl {material}\nv -1 -1 {z}\nv 1 -1 {z}\nv 1 1 {z}\nv -1 1 {z}\nf {} {} {} {}\n",
+            corners[0], corners[1], corners[2], corners[3]
+        )
+    };
+    let model = [("red", 0), ("smoke", 1), ("glass", 2)];
+    let model = (0..)
+        .zip(model)
+        .map(|(k, (name, z))| square(name, z, 4 * k + 1));
+    let model = format!("mtllib panes.mtl\n{}", model.collect::<String>());
+    folder.write("panes.obj", model);
+    let found = folder.json(&format!("info panes.obj {FACING} --pick 3,3"));
+    assert_eq!(found["seen"]["material"], "red");
+    let through = found["through"].as_array().expect("a list");
+    let told: Vec<_> = through
+        .iter()
+        .map(|veil| (veil["material"].as_str(), veil["depth"].as_f64()))
+        .collect();
+    assert_eq!(
+        told,
+        [(Some("glass"), Some(3.0)), (Some("smoke"), Some(4.0))]
+    );
+    // Half of what a quarter leaves of the wall.
+    let light = &found["light"];
+    assert!(
+        (light[3].as_f64().expect("opacity") - 1.0).abs() < 1e-6,
+        "{light}"
+    );
+    let text = folder.told(&format!("info panes.obj {FACING} --pick 3,3"));
+    let place = |name: &str| text.find(&format!("through   {name}")).expect(name);
+    assert!(place("glass") < place("smoke"), "{text}");
+
+    let found = folder.json(&format!("info panes.obj {FACING} --pick 0,0"));
+    assert_eq!(found["through"], json!([]));
+}
+
+#[test]
 fn a_pick_tells_the_exact_shares_of_a_pixel() {
     let folder = Folder::new();
     // Pixels of 0.8 m: the middle one of 5 x 5 shows a quarter of the box, the rest of the wall; the

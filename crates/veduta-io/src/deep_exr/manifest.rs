@@ -5,7 +5,7 @@
 //! `ImfIDManifest.cpp`, the only place where it is told.
 
 use super::Attribute;
-use miniz_oxide::deflate::compress_to_vec_zlib;
+use crate::deflate::deflate;
 use std::collections::BTreeMap;
 
 /// The ids of objects.
@@ -55,7 +55,7 @@ impl ObjectIds {
     pub fn attribute(&self) -> Attribute {
         let bytes = self.bytes();
         let mut value = (bytes.len() as u64).to_le_bytes().to_vec();
-        value.extend(compress_to_vec_zlib(&bytes, 6));
+        value.extend(deflate(&bytes, 6));
         Attribute::new("idManifest", "idmanifest", value)
     }
 

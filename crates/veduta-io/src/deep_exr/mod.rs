@@ -36,6 +36,7 @@ pub use header::{Attribute, Channel, DeepCompression, DeepHeader, DeepImageState
 pub use image::{DeepImage, DeepPixels, SampleType, Samples, Window};
 pub use manifest::{ObjectIds, murmur3_32};
 pub use merge::{MergeError, merge};
+pub(crate) use packing::pack;
 pub use picture::{DeepPicture, DeepSink, stream_deep_picture, write_deep_picture};
 pub(crate) use read::is_deep;
 pub use read::{DeepFile, read_deep};

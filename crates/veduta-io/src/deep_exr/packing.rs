@@ -1,18 +1,15 @@
-//! How the bytes of a chunk are packed: not at all, as runs of equal bytes (RLE), or by Deflate (ZIPS).
+//! How the bytes of a chunk are packed: not at all, as runs of equal bytes (RLE), or by Deflate (ZIPS; ZIP of
+//! flat pictures does the same with sixteen lines).
 //!
 //! Both first sort bytes (those at even places, then those at odd ones) and take differences, since
 //! the upper bytes of neighbouring numbers are alike. What does not shrink is stored as it is.
 
 use super::DeepCompression;
-use miniz_oxide::deflate::compress_to_vec_zlib;
-use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
+use crate::deflate::{MOST_OF_ONE, deflate, inflate};
 use std::borrow::Cow;
 
 /// The level of OpenEXR's own writer: higher ones take twice the time to save a few per cent.
-const DEFLATE_LEVEL: u8 = 4;
-
-/// Bytes that Deflate makes at most of one.
-const MOST_OF_DEFLATE: usize = 1032;
+const DEFLATE_LEVEL: i32 = 4;
 
 /// Bytes that a run makes at most of one: 128 of two.
 const MOST_OF_RUNS: usize = 64;
@@ -36,7 +33,7 @@ pub fn expand(compression: DeepCompression, packed: &[u8], size: usize) -> Resul
     let most = match compression {
         DeepCompression::None => 1,
         DeepCompression::Rle => MOST_OF_RUNS,
-        DeepCompression::Zips => MOST_OF_DEFLATE,
+        DeepCompression::Zips => MOST_OF_ONE,
     };
     let count = packed.len();
     if size > count.saturating_mul(most) {
@@ -47,8 +44,7 @@ pub fn expand(compression: DeepCompression, packed: &[u8], size: usize) -> Resul
             return Err(format!("{count} bytes where {size} are to be"));
         }
         DeepCompression::Rle => unpack_runs(packed, size)?,
-        DeepCompression::Zips => decompress_to_vec_zlib_with_limit(packed, size)
-            .map_err(|error| format!("{count} bytes do not inflate: {error}"))?,
+        DeepCompression::Zips => inflate(packed, size)?,
     };
     if unpacked.len() != size {
         return Err(format!(
@@ -65,7 +61,7 @@ pub fn pack(compression: DeepCompression, bytes: &[u8]) -> Cow<'_, [u8]> {
     let packed = match compression {
         DeepCompression::None => return Cow::Borrowed(bytes),
         DeepCompression::Rle => pack_runs(&differences(bytes)),
-        DeepCompression::Zips => compress_to_vec_zlib(&differences(bytes), DEFLATE_LEVEL),
+        DeepCompression::Zips => deflate(&differences(bytes), DEFLATE_LEVEL),
     };
     if packed.len() < bytes.len() {
         Cow::Owned(packed)
@@ -76,15 +72,14 @@ pub fn pack(compression: DeepCompression, bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Bytes at even places, bytes at odd places; then each less the one before, plus 128.
 fn differences(bytes: &[u8]) -> Vec<u8> {
-    let even = bytes.iter().step_by(2);
-    let odd = bytes.iter().skip(1).step_by(2);
-    let mut previous = None;
-    even.chain(odd)
-        .map(|&byte| match previous.replace(byte) {
-            None => byte,
-            Some(before) => byte.wrapping_sub(before).wrapping_add(128),
-        })
-        .collect()
+    let mut sorted: Vec<u8> = Vec::with_capacity(bytes.len());
+    sorted.extend(bytes.iter().step_by(2));
+    sorted.extend(bytes.iter().skip(1).step_by(2));
+    let mut differences = sorted.clone();
+    for (difference, pair) in differences.iter_mut().skip(1).zip(sorted.windows(2)) {
+        *difference = pair[1].wrapping_sub(pair[0]).wrapping_add(128);
+    }
+    differences
 }
 
 fn undo_differences(bytes: &mut [u8]) {

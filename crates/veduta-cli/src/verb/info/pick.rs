@@ -41,7 +41,9 @@ pub struct Picked {
     pixel: [u32; 2],
     /// At the point itself; `None` for the background.
     seen: Option<Seen>,
-    /// Which faces cover how much of the pixel, largest first.
+    /// What that is seen through, nearest first.
+    through: Vec<Seen>,
+    /// Which opaque faces cover how much of the pixel, largest first.
     shares: Vec<Share>,
     /// Linear light of the pixel, premultiplied, with its opacity.
     light: [f32; 4],
@@ -86,9 +88,12 @@ pub fn pick(scene: &Scene, map: &VisibilityMap, size: Size, spot: Spot) -> Resul
     let frame = PixelGrid::of_frame(size.width, size.height);
     let corner = spot.floor();
     let pixel = frame.window(corner.x, corner.y, 1, 1);
+    let image = frame.image_from_pixels(spot);
     let seen = map
-        .opaque_at(frame.image_from_pixels(spot))
+        .opaque_at(image)
         .map(|fragment| seen_at(scene, map, map.opaque.face(fragment), &frame, spot));
+    let veils = map.veils_at(image).into_iter();
+    let through = veils.map(|veil| seen_at(scene, map, map.veils.face(veil), &frame, spot));
     let mut shares: Vec<Share> = coverage(map, &pixel)
         .into_iter()
         .map(|row| Share {
@@ -105,6 +110,7 @@ pub fn pick(scene: &Scene, map: &VisibilityMap, size: Size, spot: Spot) -> Resul
         spot,
         pixel: [corner.x as u32, corner.y as u32],
         seen,
+        through: through.collect(),
         shares,
         light: picture.pixels[0],
         origin: world.crs.clone().map(|crs| (crs, world.origin)),
@@ -155,7 +161,7 @@ fn normal_of(scene: &Scene, object: ObjectId, face: u32) -> DVec3 {
 
 impl Picked {
     pub fn as_json(&self) -> Value {
-        let seen = self.seen.as_ref().map(|seen| {
+        let told = |seen: &Seen| {
             let mut told = json!({
                 "object": seen.object,
                 "face": seen.face,
@@ -170,7 +176,7 @@ impl Picked {
                 told["coordinates"] = json!((*origin + seen.position).to_array());
             }
             told
-        });
+        };
         let shares: Vec<Value> = self
             .shares
             .iter()
@@ -179,7 +185,8 @@ impl Picked {
         json!({
             "pick": self.spot.to_array(),
             "pixel": self.pixel,
-            "seen": seen,
+            "seen": self.seen.as_ref().map(told),
+            "through": self.through.iter().map(told).collect::<Vec<Value>>(),
             "faces": shares,
             "background": self.background(),
             "light": self.light,
@@ -224,6 +231,14 @@ impl Picked {
                     seen.depth, seen.distance
                 )?;
             }
+        }
+        for veil in &self.through {
+            let (object, material) = (plain(&veil.object), plain(&veil.material));
+            writeln!(
+                text,
+                "  through   {object}, face {}, {material}, {:.6} m from the eye",
+                veil.face, veil.distance
+            )?;
         }
         let [column, row] = self.pixel;
         writeln!(text, "  pixel     {column}, {row} shows")?;

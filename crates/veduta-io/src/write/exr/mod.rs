@@ -7,18 +7,27 @@ mod layers;
 pub use layers::Layers;
 
 use super::{ExrCompression, PictureOptions, Samples, WriteProblem};
-use exr::block::{BlockIndex, UncompressedBlock};
-use exr::image::write::channels::{ChannelsWriter, WritableChannels};
+use crate::deep_exr::{DeepCompression, pack};
+use exr::block::chunk::{
+    Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates,
+};
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_indices};
 use exr::math::RoundingMode;
+use exr::meta::BlockDescription;
 use exr::meta::attribute::{
-    ChannelDescription, ChannelList, LevelMode, LineOrder, SampleType, Text,
+    ChannelDescription, LevelMode, LineOrder, SampleType, Text, TileDescription,
 };
 use exr::meta::header::{Header, LayerAttributes};
-use exr::prelude::{Blocks, Compression, Encoding, Image, Vec2, WritableImage, f16};
+use exr::prelude::{Compression, Vec2, f16};
 use half::slice::HalfFloatSliceExt;
 use header::RecordHead;
+use rayon::prelude::*;
 use std::io::{Seek, Write};
 use veduta::accumulate::Picture;
+
+/// Blocks that are packed side by side before they are written.
+const BLOCKS_AT_ONCE: usize = 64;
 
 /// A channel: its name, and its value at each pixel, counted along rows from the top.
 struct Channel<'a> {
@@ -88,92 +97,112 @@ pub fn write(
     // The order that the format asks for.
     channels.sort_by(|a, b| a.name.cmp(&b.name));
     let size = Vec2(picture.width as usize, picture.height as usize);
-    let channels = Channels {
-        width: size.0,
-        list: channels,
-    };
-    let mut image = Image::from_encoded_channels(size, encoding(options), channels);
-    image.layer_data.attributes = attributes;
+    let header = header(size, &channels, options).with_attributes(attributes);
     let mut recorder = RecordHead::new(writer);
-    image
-        .write()
-        .to_buffered(&mut recorder)
-        .map_err(|error| match error {
-            exr::error::Error::Io(error) => WriteProblem::Io(error),
-            other => WriteProblem::Encode(other.to_string()),
-        })?;
+    exr::block::write(
+        &mut recorder,
+        [header].into_iter().collect(),
+        true,
+        |meta, chunks| {
+            let blocks = enumerate_ordered_header_block_indices(&meta.headers);
+            let blocks: Vec<(usize, BlockIndex)> = blocks.collect();
+            for blocks in blocks.chunks(BLOCKS_AT_ONCE) {
+                let packed: Vec<exr::error::Result<Chunk>> = blocks
+                    .par_iter()
+                    .map(|&(_, block)| chunk(&meta.headers, block, &channels))
+                    .collect();
+                for (&(index, _), chunk) in blocks.iter().zip(packed) {
+                    chunks.write_chunk(index, chunk?)?;
+                }
+            }
+            Ok(())
+        },
+    )
+    .map_err(|error| match error {
+        exr::error::Error::Io(error) => WriteProblem::Io(error),
+        other => WriteProblem::Encode(other.to_string()),
+    })?;
     Ok(recorder.put_in_order()?)
 }
 
-fn encoding(options: &PictureOptions) -> Encoding {
-    Encoding {
-        compression: match options.exr_compression {
-            ExrCompression::None => Compression::Uncompressed,
-            ExrCompression::Rle => Compression::RLE,
-            ExrCompression::Zips => Compression::ZIP1,
-            ExrCompression::Zip => Compression::ZIP16,
-            ExrCompression::Piz => Compression::PIZ,
-        },
-        blocks: match options.exr_tile {
-            None => Blocks::ScanLines,
-            Some(side) => Blocks::Tiles(Vec2(side as usize, side as usize)),
-        },
-        // The same bytes whatever the number of threads.
-        line_order: LineOrder::Increasing,
-    }
-}
-
-/// All channels, ascending by name, as the encoder asks for them: line by line.
-struct Channels<'a> {
-    /// Of the picture, in pixels.
-    width: usize,
-    list: Vec<Channel<'a>>,
-}
-
-impl<'a, 'slf> WritableChannels<'slf> for Channels<'a>
-where
-    'a: 'slf,
-{
-    type Writer = &'slf Self;
-
-    fn infer_channel_list(&self) -> ChannelList {
-        let describe = |channel: &Channel| {
-            let sample_type = match channel.values {
-                Values::F16(_) => SampleType::F16,
-                Values::F32(_) => SampleType::F32,
-                Values::U32(_) => SampleType::U32,
-            };
-            ChannelDescription::named(channel.name.as_str(), sample_type)
+fn header(size: Vec2<usize>, channels: &[Channel], options: &PictureOptions) -> Header {
+    let describe = |channel: &Channel| {
+        let sample_type = match channel.values {
+            Values::F16(_) => SampleType::F16,
+            Values::F32(_) => SampleType::F32,
+            Values::U32(_) => SampleType::U32,
         };
-        ChannelList::new(self.list.iter().map(describe).collect())
-    }
-
-    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
-        (LevelMode::Singular, RoundingMode::Down)
-    }
-
-    fn create_writer(&'slf self, _: &Header) -> &'slf Self {
-        self
-    }
+        ChannelDescription::named(channel.name.as_str(), sample_type)
+    };
+    let compression = match options.exr_compression {
+        ExrCompression::None => Compression::Uncompressed,
+        ExrCompression::Rle => Compression::RLE,
+        ExrCompression::Zips => Compression::ZIP1,
+        ExrCompression::Zip => Compression::ZIP16,
+        ExrCompression::Piz => Compression::PIZ,
+    };
+    let blocks = match options.exr_tile {
+        None => BlockDescription::ScanLines,
+        Some(side) => BlockDescription::Tiles(TileDescription {
+            tile_size: Vec2(side as usize, side as usize),
+            level_mode: LevelMode::Singular,
+            rounding_mode: RoundingMode::Down,
+        }),
+    };
+    let channels = channels.iter().map(describe).collect();
+    // The order is named so that the bytes do not depend on the number of threads.
+    Header::new(Text::default(), size, channels).with_encoding(
+        compression,
+        blocks,
+        LineOrder::Increasing,
+    )
 }
 
-impl ChannelsWriter for &Channels<'_> {
-    fn extract_uncompressed_block(&self, header: &Header, block: BlockIndex) -> Vec<u8> {
-        UncompressedBlock::collect_block_data_from_lines(&header.channels, block, |line| {
-            let at = line.location.position;
-            let first = at.1 * self.width + at.0;
-            let written = match &self.list[line.location.channel].values {
-                Values::F16(value) => {
-                    let values = (first..first + line.location.sample_count).map(value);
-                    let halves = halves(&values.collect::<Vec<f32>>());
-                    line.write_samples(|k| halves[k])
-                }
-                Values::F32(value) => line.write_samples(|k| value(first + k)),
-                Values::U32(value) => line.write_samples(|k| value(first + k)),
-            };
-            written.expect("a line has room for its samples");
-        })
+/// A block of the picture, packed. Deflate is our own, which is quicker than the encoder's.
+fn chunk(headers: &[Header], block: BlockIndex, channels: &[Channel]) -> exr::error::Result<Chunk> {
+    let header = &headers[block.layer];
+    let data = samples(header, block, channels);
+    let is_deflated = matches!(header.compression, Compression::ZIP1 | Compression::ZIP16);
+    // The encoder puts bytes in the file's order where the machine's is another.
+    if !is_deflated || cfg!(target_endian = "big") {
+        return UncompressedBlock { index: block, data }.compress_to_chunk(headers);
     }
+    let compressed_pixels_le = pack(DeepCompression::Zips, &data).into_owned();
+    let compressed_block = match header.blocks {
+        BlockDescription::ScanLines => CompressedBlock::ScanLine(CompressedScanLineBlock {
+            y_coordinate: block.pixel_position.y() as i32,
+            compressed_pixels_le,
+        }),
+        BlockDescription::Tiles(tiles) => CompressedBlock::Tile(CompressedTileBlock {
+            coordinates: TileCoordinates {
+                tile_index: block.pixel_position / tiles.tile_size,
+                level_index: block.level,
+            },
+            compressed_pixels_le,
+        }),
+    };
+    Ok(Chunk {
+        layer_index: block.layer,
+        compressed_block,
+    })
+}
+
+/// The samples of a block, line by line, and of each line channel by channel.
+fn samples(header: &Header, block: BlockIndex, channels: &[Channel]) -> Vec<u8> {
+    UncompressedBlock::collect_block_data_from_lines(&header.channels, block, |line| {
+        let at = line.location.position;
+        let first = at.1 * header.layer_size.0 + at.0;
+        let written = match &channels[line.location.channel].values {
+            Values::F16(value) => {
+                let values = (first..first + line.location.sample_count).map(value);
+                let halves = halves(&values.collect::<Vec<f32>>());
+                line.write_samples(|k| halves[k])
+            }
+            Values::F32(value) => line.write_samples(|k| value(first + k)),
+            Values::U32(value) => line.write_samples(|k| value(first + k)),
+        };
+        written.expect("a line has room for its samples");
+    })
 }
 
 /// The nearest f16 of each. What is too bright becomes the brightest there is: infinities would spread

@@ -1,6 +1,6 @@
 use super::outline::{Point, Rounding};
 use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
-use miniz_oxide::deflate::compress_to_vec_zlib;
+use crate::deflate::deflate;
 use pdf_writer::{Array, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -11,7 +11,7 @@ use veduta_geometry::DVec2;
 const POINTS_PER_PIXEL: f64 = 0.75;
 
 /// How hard to compress, of 10.
-const COMPRESSION: u8 = 9;
+const COMPRESSION: i32 = 9;
 
 /// A PDF of one page. Groups are optional content groups, which viewers list as layers; a part of
 /// the page within the marks of its group and of all around it shows when all of them are on.
@@ -20,7 +20,7 @@ const COMPRESSION: u8 = 9;
 pub fn encode(drawing: &Drawing, options: &VectorOptions) -> Vec<u8> {
     let mut layers = Layers::default();
     let content = content(drawing, options, &mut layers);
-    let compressed = compress_to_vec_zlib(content.as_bytes(), COMPRESSION);
+    let compressed = deflate(content.as_bytes(), COMPRESSION);
 
     let [catalog, pages, page, stream, document] = [1, 2, 3, 4, 5].map(Ref::new);
     let layer_ref = |index: usize| Ref::new(6 + index as i32);
