@@ -36,6 +36,7 @@ mod read;
 mod read_picture;
 mod reason;
 mod scale;
+pub mod sphere;
 pub mod tone;
 mod write;
 
@@ -71,7 +72,9 @@ pub use read::{
 pub use read::{LevelOfDetail, LevelOfDetailError};
 #[cfg(feature = "toml")]
 pub use read::{change_scene, closest_name, scene_file_schema, set_in_scene};
-pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
+pub use read_picture::{
+    LoadedPicture, PictureProblem, ReadPictureError, read_linear_picture, read_picture,
+};
 pub use reason::reason;
 pub use scale::scaled;
 pub use write::{

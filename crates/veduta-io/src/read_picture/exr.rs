@@ -1,8 +1,10 @@
 use super::decoded::{Channels, Decoded, Samples};
 use super::{PictureProblem, check_size};
 use crate::deep_exr::{self, DeepFile, DeepProblem};
+use crate::sphere::{Panorama, Pose};
 use exr::error::Error;
 use exr::meta::MetaData;
+use exr::meta::attribute::EnvironmentMap;
 use exr::prelude::{ReadChannels, ReadLayers};
 use std::io::Cursor;
 
@@ -41,6 +43,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         .collect();
     further.sort();
     further.dedup();
+    let environment = image.layer_data.attributes.environment_map;
     let (size, pixels) = image.layer_data.channel_data.pixels;
     let (width, height) = check_size(size.0 as u64, size.1 as u64, bytes.len())?;
     Ok(Decoded {
@@ -49,6 +52,12 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         channels: Channels::ColorOpacity,
         samples: Samples::F32(pixels.into_flattened()),
         premultiplied: true,
+        panorama: environment.map(|kind| match kind {
+            EnvironmentMap::LatitudeLongitude => Panorama::ExrLatLong {
+                pose: Pose::default(),
+            },
+            EnvironmentMap::Cube => Panorama::ExrCube,
+        }),
         further_channels: further,
         warnings: Vec::new(),
     })
@@ -71,6 +80,7 @@ fn read_deep(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         channels: Channels::ColorOpacity,
         samples: Samples::F32(picture.pixels.into_flattened()),
         premultiplied: true,
+        panorama: None,
         further_channels: Vec::new(),
         warnings,
     })

@@ -7,11 +7,12 @@ mod layers;
 pub use layers::Layers;
 
 use super::{ExrCompression, PictureOptions, Samples, WriteProblem};
+use crate::sphere::Panorama;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::image::write::channels::{ChannelsWriter, WritableChannels};
 use exr::math::RoundingMode;
 use exr::meta::attribute::{
-    ChannelDescription, ChannelList, LevelMode, LineOrder, SampleType, Text,
+    ChannelDescription, ChannelList, EnvironmentMap, LevelMode, LineOrder, SampleType, Text,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{Blocks, Compression, Encoding, Image, Vec2, WritableImage, f16};
@@ -80,6 +81,14 @@ pub fn write(
         software_name: Some(Text::from("veduta")),
         ..LayerAttributes::default()
     };
+    match options.panorama {
+        Some(Panorama::ExrLatLong { pose }) => {
+            attributes.environment_map = Some(EnvironmentMap::LatitudeLongitude);
+            attributes.world_to_camera = Some(pose.world_to_camera());
+        }
+        Some(Panorama::ExrCube) => attributes.environment_map = Some(EnvironmentMap::Cube),
+        _ => {}
+    }
     if let Some(layers) = layers {
         layers.check(picture)?;
         layers.add_channels(samples, &mut channels);
