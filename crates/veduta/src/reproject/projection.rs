@@ -87,6 +87,19 @@ impl Projection {
         self
     }
 
+    /// World direction of the middle of what is seen: the lens's axis, of a ball the other way.
+    pub fn axis(&self) -> DVec3 {
+        match self.lens {
+            Lens::Ball => -self.orientation.forward(),
+            _ => self.orientation.forward(),
+        }
+    }
+
+    /// Pixels to a unit of the lens plane along y: the radius of a disc.
+    pub fn pixels_per_unit(&self) -> f64 {
+        self.scale.y.abs()
+    }
+
     /// Point of the lens plane at an image point.
     #[inline]
     pub fn lens_from_image(&self, image: DVec2) -> DVec2 {
