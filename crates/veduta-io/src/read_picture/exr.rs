@@ -1,12 +1,13 @@
 use super::decoded::{Channels, Decoded, Samples};
 use super::{PictureProblem, check_size};
 use crate::deep_exr::{self, DeepFile, DeepProblem};
-use crate::sphere::{Panorama, Pose};
+use crate::sphere::Panorama;
 use exr::error::Error;
 use exr::meta::MetaData;
 use exr::meta::attribute::EnvironmentMap;
 use exr::prelude::{ReadChannels, ReadLayers};
 use std::io::Cursor;
+use veduta::reproject::Orientation;
 
 /// Reads the first layer that has R, G and B, with A if it has it; of a deep file the first deep part,
 /// made flat.
@@ -54,7 +55,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         premultiplied: true,
         panorama: environment.map(|kind| match kind {
             EnvironmentMap::LatitudeLongitude => Panorama::ExrLatLong {
-                pose: Pose::default(),
+                orientation: Orientation::default(),
             },
             EnvironmentMap::Cube => Panorama::ExrCube,
         }),

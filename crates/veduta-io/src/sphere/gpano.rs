@@ -3,10 +3,21 @@
 //! A packet of XMP is RDF in XML; the properties of the namespace [`NAMESPACE`] stand in it as attributes
 //! or as elements. Of them we use those that tell where the picture lies on the sphere.
 
-use super::pose::Pose;
+use veduta::reproject::Orientation;
 
 /// The namespace of the properties.
 const NAMESPACE: &str = "http://ns.google.com/photos/1.0/panorama/";
+
+/// How a camera stood, in radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Where the middle of the picture lies: clockwise from north.
+    pub heading: f64,
+    /// How far that is above the horizon.
+    pub pitch: f64,
+    /// How far the camera leaned to the right.
+    pub roll: f64,
+}
 
 /// What a picture tells of itself as a panorama, all of it in equirectangular projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +96,7 @@ impl Gpano {
         let left_top = [pixels("CroppedAreaLeftPixels")?, pixels("CroppedAreaTopPixels")?];
         let angle = |name: &str| Ok::<_, String>(number(name)?.unwrap_or(0.0).to_radians());
         let pose = Pose {
-            yaw: angle("PoseHeadingDegrees")?,
+            heading: angle("PoseHeadingDegrees")?,
             pitch: angle("PosePitchDegrees")?,
             roll: angle("PoseRollDegrees")?,
         };
@@ -127,6 +138,11 @@ impl Gpano {
         [share(0), share(1)]
     }
 
+    /// The orientation that makes the horizon level; the middle of the picture stays in front.
+    pub fn level(&self) -> Orientation {
+        Orientation::from_angles(0.0, self.pose.pitch, self.pose.roll)
+    }
+
     /// A packet of XMP that tells it.
     pub fn packet(&self) -> String {
         let [full_width, full_height] = self.full;
@@ -140,7 +156,7 @@ impl Gpano {
              GPano:CroppedAreaLeftPixels=\"{left}\" GPano:CroppedAreaTopPixels=\"{top}\""
         );
         for (name, angle) in [
-            ("PoseHeadingDegrees", self.pose.yaw),
+            ("PoseHeadingDegrees", self.pose.heading),
             ("PosePitchDegrees", self.pose.pitch),
             ("PoseRollDegrees", self.pose.roll),
         ] {
@@ -164,7 +180,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read() {
         let pose = Pose {
-            yaw: 1.25,
+            heading: 1.25,
             pitch: -0.5,
             roll: 0.0,
         };
@@ -181,7 +197,7 @@ mod tests {
             let read = read.expect("is of a panorama");
             assert_eq!((read.full, read.left_top), (told.full, told.left_top));
             assert_eq!(read.cropped, told.cropped);
-            assert!((read.pose.yaw - told.pose.yaw).abs() < 1e-12);
+            assert!((read.pose.heading - told.pose.heading).abs() < 1e-12);
         }
     }
 

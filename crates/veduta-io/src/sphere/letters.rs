@@ -2,8 +2,11 @@
 
 use veduta::geometry::DVec2;
 
-/// Width and height of the grid that letters are drawn on, and the distance from one to the next.
-const [WIDTH, HEIGHT, ADVANCE]: [f64; 3] = [4.0, 6.0, 5.5];
+/// Width and height of the grid that letters are drawn on.
+const WIDTH: f64 = 4.0;
+const HEIGHT: f64 = 6.0;
+/// From a letter to the next.
+const ADVANCE: f64 = 5.5;
 
 /// Of each letter its strokes, as corners of one digit for x and one for y, from the left top corner.
 const LETTERS: &[(char, &str)] = &[

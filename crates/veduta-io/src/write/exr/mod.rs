@@ -20,6 +20,7 @@ use half::slice::HalfFloatSliceExt;
 use header::RecordHead;
 use std::io::{Seek, Write};
 use veduta::accumulate::Picture;
+use veduta::reproject::Orientation;
 
 /// A channel: its name, and its value at each pixel, counted along rows from the top.
 struct Channel<'a> {
@@ -82,9 +83,9 @@ pub fn write(
         ..LayerAttributes::default()
     };
     match options.panorama {
-        Some(Panorama::ExrLatLong { pose }) => {
+        Some(Panorama::ExrLatLong { orientation }) => {
             attributes.environment_map = Some(EnvironmentMap::LatitudeLongitude);
-            attributes.world_to_camera = Some(pose.world_to_camera());
+            attributes.world_to_camera = Some(world_to_camera(&orientation));
         }
         Some(Panorama::ExrCube) => attributes.environment_map = Some(EnvironmentMap::Cube),
         _ => {}
@@ -112,6 +113,20 @@ pub fn write(
             other => WriteProblem::Encode(other.to_string()),
         })?;
     Ok(recorder.put_in_order()?)
+}
+
+/// For vectors that stand to the left of the matrix; in both spaces x is right, y up and z forward.
+fn world_to_camera(orientation: &Orientation) -> [f32; 16] {
+    // The inverse of a rotation is its transpose, and row vectors transpose once more.
+    let axes = [
+        orientation.right(),
+        orientation.up(),
+        orientation.forward(),
+    ];
+    let [right, up, forward] = axes.map(|axis| [axis.x, axis.y, -axis.z].map(|v| v as f32));
+    let row = |k: usize| [right[k], up[k], forward[k], 0.0];
+    let rows = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
+    std::array::from_fn(|k| rows[k / 4][k % 4])
 }
 
 fn encoding(options: &PictureOptions) -> Encoding {
