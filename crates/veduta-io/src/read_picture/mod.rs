@@ -10,12 +10,7 @@ mod decoded;
 mod exr;
 mod npy;
 mod pfm;
-#[cfg(any(
-    feature = "png",
-    feature = "jpeg",
-    feature = "webp",
-    feature = "hdr"
-))]
+#[cfg(any(feature = "png", feature = "jpeg", feature = "webp", feature = "hdr"))]
 mod raster;
 #[cfg(feature = "tiff")]
 mod tiff;

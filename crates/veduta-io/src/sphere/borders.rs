@@ -69,7 +69,9 @@ type Samples = [[f32; 3]; SAMPLES];
 pub fn fit(sides: &[&Picture; 6]) -> Fit {
     let size = sides[0].width;
     assert!(
-        sides.iter().all(|side| [side.width, side.height] == [size; 2]),
+        sides
+            .iter()
+            .all(|side| [side.width, side.height] == [size; 2]),
         "sides are squares of one size"
     );
     let edges: Vec<[Samples; 4]> = sides
@@ -215,7 +217,9 @@ fn turned_edges(turn: Turn) -> [(usize, bool); 4] {
     ENDS.map(|[start, end]| {
         let found = [corner(start), corner(end)];
         let reversed = [found[1], found[0]];
-        let edge = ENDS.iter().position(|ends| *ends == found || *ends == reversed);
+        let edge = ENDS
+            .iter()
+            .position(|ends| *ends == found || *ends == reversed);
         (edge.expect("edges become edges"), !ENDS.contains(&found))
     })
 }
@@ -246,7 +250,10 @@ fn best(table: &Table, joints: &[Joint]) -> (f64, Vec<Change>) {
     for joint in joints {
         sum += search.cost(joint, laid[joint.sides[0]], laid[joint.sides[1]]);
     }
-    let changes = laid.iter().enumerate().filter(|(k, (from, turn))| from != k || *turn != 0);
+    let changes = laid
+        .iter()
+        .enumerate()
+        .filter(|(k, (from, turn))| from != k || *turn != 0);
     let changes = changes.map(|(k, &(from, turn))| Change {
         place: Side::ALL[k],
         from: Side::ALL[from],
@@ -284,7 +291,11 @@ impl Search<'_> {
             return;
         }
         for from in 0..6 {
-            if self.laid[..place].iter().flatten().any(|laid| laid.0 == from) {
+            if self.laid[..place]
+                .iter()
+                .flatten()
+                .any(|laid| laid.0 == from)
+            {
                 continue;
             }
             for quarters in 0..4 {
@@ -323,7 +334,12 @@ mod tests {
                 let length = d.iter().map(|v| v * v).sum::<f64>().sqrt();
                 let [x, y, z] = d.map(|v| v / length);
                 let wave = |v: f64| (0.5 + 0.5 * v.sin()) as f32;
-                [wave(3.0 * x + y), wave(2.0 * y - z + 0.5 * x * x), wave(4.0 * z + x * y), 1.0]
+                [
+                    wave(3.0 * x + y),
+                    wave(2.0 * y - z + 0.5 * x * x),
+                    wave(4.0 * z + x * y),
+                    1.0,
+                ]
             };
             Picture {
                 width: size,
@@ -368,14 +384,22 @@ mod tests {
         let mut sides = world();
         sides.swap(Side::Left.index(), Side::Right.index());
         let found = fit_of(&sides).better.expect("could fit");
-        let pairs: Vec<_> = found.iter().map(|change| (change.place, change.from)).collect();
-        assert_eq!(pairs, [(Side::Right, Side::Left), (Side::Left, Side::Right)]);
+        let pairs: Vec<_> = found
+            .iter()
+            .map(|change| (change.place, change.from))
+            .collect();
+        assert_eq!(
+            pairs,
+            [(Side::Right, Side::Left), (Side::Left, Side::Right)]
+        );
 
         let flip = Turn {
             mirrored: true,
             quarters: 0,
         };
-        let found = fit_of(&world().map(|side| flip.of(side))).better.expect("could fit");
+        let found = fit_of(&world().map(|side| flip.of(side)))
+            .better
+            .expect("could fit");
         assert!(found.iter().all(|change| change.turn.mirrored), "{found:?}");
     }
 
@@ -383,14 +407,18 @@ mod tests {
     fn noise_and_single_pixels_are_not_accused() {
         let mut state = 1_u64;
         let mut noise = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             (state >> 40) as f32 / (1 << 24) as f32
         };
         for size in [1, 2, 33] {
             let sides = Side::ALL.map(|_| Picture {
                 width: size,
                 height: size,
-                pixels: (0..size * size).map(|_| [noise(), noise(), noise(), 1.0]).collect(),
+                pixels: (0..size * size)
+                    .map(|_| [noise(), noise(), noise(), 1.0])
+                    .collect(),
             });
             let found = fit_of(&sides);
             assert_eq!(found.better, None, "{size}");

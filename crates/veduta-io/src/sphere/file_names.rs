@@ -79,7 +79,9 @@ pub enum NamesError {
     )]
     NoSide(String),
     /// Two files are the same side.
-    #[error("{first} and {second} are both the side {side} by their names; name the sides in the order of the files, such as --order frblud")]
+    #[error(
+        "{first} and {second} are both the side {side} by their names; name the sides in the order of the files, such as --order frblud"
+    )]
     Twice {
         /// One file.
         first: String,
@@ -155,16 +157,87 @@ mod tests {
         use Side::{Back, Down, Front, Left, Right, Up};
         let all = [Front, Right, Back, Left, Up, Down];
         for (files, sides) in [
-            (["front.png", "right.png", "back.png", "left.png", "top.png", "bottom.png"], all),
-            (["a/F.exr", "a/R.exr", "a/B.exr", "a/L.exr", "a/U.exr", "a/D.exr"], all),
-            (["pano_f.jpg", "pano_r.jpg", "pano_b.jpg", "pano_l.jpg", "pano_u.jpg", "pano_d.jpg"], all),
-            (["nightft.tif", "nightrt.tif", "nightbk.tif", "nightlf.tif", "nightup.tif", "nightdn.tif"], all),
-            (["town-front.1.png", "town-right.1.png", "town-rear.1.png", "town-left.1.png", "town-up.1.png", "town-down.1.png"], all),
-            (["px.hdr", "nx.hdr", "py.hdr", "ny.hdr", "pz.hdr", "nz.hdr"], [Right, Left, Up, Down, Front, Back]),
-            (["posx.jpg", "negx.jpg", "posy.jpg", "negy.jpg", "posz.jpg", "negz.jpg"], [Right, Left, Up, Down, Front, Back]),
-            (["+X.png", "-X.png", "+Y.png", "-Y.png", "+Z.png", "-Z.png"], [Right, Left, Up, Down, Front, Back]),
-            (["s_0.png", "s_1.png", "s_2.png", "s_3.png", "s_4.png", "s_5.png"], [Right, Left, Up, Down, Front, Back]),
-            (["RoomFront.png", "RoomRight.png", "RoomBack.png", "RoomLeft.png", "RoomTop.png", "RoomBottom.png"], all),
+            (
+                [
+                    "front.png",
+                    "right.png",
+                    "back.png",
+                    "left.png",
+                    "top.png",
+                    "bottom.png",
+                ],
+                all,
+            ),
+            (
+                [
+                    "a/F.exr", "a/R.exr", "a/B.exr", "a/L.exr", "a/U.exr", "a/D.exr",
+                ],
+                all,
+            ),
+            (
+                [
+                    "pano_f.jpg",
+                    "pano_r.jpg",
+                    "pano_b.jpg",
+                    "pano_l.jpg",
+                    "pano_u.jpg",
+                    "pano_d.jpg",
+                ],
+                all,
+            ),
+            (
+                [
+                    "nightft.tif",
+                    "nightrt.tif",
+                    "nightbk.tif",
+                    "nightlf.tif",
+                    "nightup.tif",
+                    "nightdn.tif",
+                ],
+                all,
+            ),
+            (
+                [
+                    "town-front.1.png",
+                    "town-right.1.png",
+                    "town-rear.1.png",
+                    "town-left.1.png",
+                    "town-up.1.png",
+                    "town-down.1.png",
+                ],
+                all,
+            ),
+            (
+                ["px.hdr", "nx.hdr", "py.hdr", "ny.hdr", "pz.hdr", "nz.hdr"],
+                [Right, Left, Up, Down, Front, Back],
+            ),
+            (
+                [
+                    "posx.jpg", "negx.jpg", "posy.jpg", "negy.jpg", "posz.jpg", "negz.jpg",
+                ],
+                [Right, Left, Up, Down, Front, Back],
+            ),
+            (
+                ["+X.png", "-X.png", "+Y.png", "-Y.png", "+Z.png", "-Z.png"],
+                [Right, Left, Up, Down, Front, Back],
+            ),
+            (
+                [
+                    "s_0.png", "s_1.png", "s_2.png", "s_3.png", "s_4.png", "s_5.png",
+                ],
+                [Right, Left, Up, Down, Front, Back],
+            ),
+            (
+                [
+                    "RoomFront.png",
+                    "RoomRight.png",
+                    "RoomBack.png",
+                    "RoomLeft.png",
+                    "RoomTop.png",
+                    "RoomBottom.png",
+                ],
+                all,
+            ),
         ] {
             assert_eq!(sides_by_names(&files), Ok(sides.to_vec()), "{files:?}");
         }

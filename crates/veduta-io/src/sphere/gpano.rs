@@ -70,7 +70,9 @@ impl Gpano {
             None => Ok(None),
             Some(text) => match text.parse::<f64>() {
                 Ok(number) if number.is_finite() => Ok(Some(number)),
-                _ => Err(format!("its XMP tells a {name} of {text:?}, which is no number")),
+                _ => Err(format!(
+                    "its XMP tells a {name} of {text:?}, which is no number"
+                )),
             },
         };
         match property("ProjectionType") {
@@ -88,12 +90,18 @@ impl Gpano {
             Some(count) => Err(format!("its XMP tells a {name} of {count}")),
             None => Ok(None),
         };
-        let full = [pixels("FullPanoWidthPixels")?, pixels("FullPanoHeightPixels")?];
+        let full = [
+            pixels("FullPanoWidthPixels")?,
+            pixels("FullPanoHeightPixels")?,
+        ];
         let cropped = [
             pixels("CroppedAreaImageWidthPixels")?,
             pixels("CroppedAreaImageHeightPixels")?,
         ];
-        let left_top = [pixels("CroppedAreaLeftPixels")?, pixels("CroppedAreaTopPixels")?];
+        let left_top = [
+            pixels("CroppedAreaLeftPixels")?,
+            pixels("CroppedAreaTopPixels")?,
+        ];
         let angle = |name: &str| Ok::<_, String>(number(name)?.unwrap_or(0.0).to_radians());
         let pose = Pose {
             heading: angle("PoseHeadingDegrees")?,
@@ -216,13 +224,27 @@ mod tests {
              <g:FullPanoHeightPixels> 400 </g:FullPanoHeightPixels>";
         let crop = "<g:CroppedAreaTopPixels>100</g:CroppedAreaTopPixels>\
              <g:CroppedAreaImageHeightPixels>200</g:CroppedAreaImageHeightPixels>";
-        let found = read(&format!("{full}{crop}")).expect("is sound").expect("is one");
+        let found = read(&format!("{full}{crop}"))
+            .expect("is sound")
+            .expect("is one");
         assert_eq!(found.part(), [[0.0, 1.0], [0.25, 0.75]]);
         for (inside, told) in [
-            ("<g:ProjectionType>cylindrical</g:ProjectionType>".to_owned(), "cylindrical"),
-            (format!("{full}<g:CroppedAreaLeftPixels>9</g:CroppedAreaLeftPixels>"), "809"),
-            ("<g:FullPanoWidthPixels>many</g:FullPanoWidthPixels>".to_owned(), "many"),
-            ("<g:FullPanoWidthPixels>-5</g:FullPanoWidthPixels>".to_owned(), "-5"),
+            (
+                "<g:ProjectionType>cylindrical</g:ProjectionType>".to_owned(),
+                "cylindrical",
+            ),
+            (
+                format!("{full}<g:CroppedAreaLeftPixels>9</g:CroppedAreaLeftPixels>"),
+                "809",
+            ),
+            (
+                "<g:FullPanoWidthPixels>many</g:FullPanoWidthPixels>".to_owned(),
+                "many",
+            ),
+            (
+                "<g:FullPanoWidthPixels>-5</g:FullPanoWidthPixels>".to_owned(),
+                "-5",
+            ),
         ] {
             let error = read(&inside).expect_err(told);
             assert!(error.contains(told), "{error}");

@@ -123,7 +123,11 @@ impl Place {
         let point = projection.lens_from_image(at);
         let radius = point.length();
         let along = |r: f64| {
-            let point = if radius > 0.0 { point * (r / radius) } else { DVec2::new(r, 0.0) };
+            let point = if radius > 0.0 {
+                point * (r / radius)
+            } else {
+                DVec2::new(r, 0.0)
+            };
             Some(projection.lens.direction(point)?.z.clamp(-1.0, 1.0).acos())
         };
         let from_axis = along(radius)?;
@@ -179,7 +183,11 @@ fn names(projection: &Projection) -> Vec<Stroke> {
             from_axis.cos(),
         );
         if let Some(point) = projection.lens.point(direction) {
-            found.extend(strokes(text, projection.image_from_lens(point), height * radius));
+            found.extend(strokes(
+                text,
+                projection.image_from_lens(point),
+                height * radius,
+            ));
         }
     };
     for (name, azimuth) in [
@@ -193,7 +201,13 @@ fn names(projection: &Projection) -> Vec<Stroke> {
     for ten in (20..=80).step_by(10) {
         let altitude = f64::from(ten).to_radians();
         for azimuth in [7.5_f64, 187.5] {
-            put(&mut found, &ten.to_string(), altitude, azimuth.to_radians(), 0.025);
+            put(
+                &mut found,
+                &ten.to_string(),
+                altitude,
+                azimuth.to_radians(),
+                0.025,
+            );
         }
     }
     found
@@ -234,7 +248,12 @@ mod tests {
         let alpha = |x: usize| f64::from(picture.pixels[200 * 400 + x][3]);
         assert_eq!(alpha(200), 1.0);
         // Ten degrees of 180 are a ninth of the radius.
-        assert!(alpha(24) > 0.99 && alpha(1) < 0.01, "{} {}", alpha(24), alpha(1));
+        assert!(
+            alpha(24) > 0.99 && alpha(1) < 0.01,
+            "{} {}",
+            alpha(24),
+            alpha(1)
+        );
         assert!((alpha(11) - 0.5).abs() < 0.05, "{}", alpha(11));
         let rises = (0..40).map(alpha).collect::<Vec<_>>();
         assert!(rises.is_sorted(), "{rises:?}");
@@ -244,7 +263,11 @@ mod tests {
     fn guides_leave_what_is_outside_of_the_circle() {
         let (projection, mut picture) = dome(64);
         let corner = picture.pixels[0];
-        draw_guides(&mut picture, &projection, &[Guide::Alignment, Guide::SafeArea]);
+        draw_guides(
+            &mut picture,
+            &projection,
+            &[Guide::Alignment, Guide::SafeArea],
+        );
         assert_eq!(picture.pixels[0], corner);
         assert_ne!(picture.pixels[32 * 64 + 32], corner, "the zenith is marked");
     }

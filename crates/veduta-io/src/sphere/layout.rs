@@ -53,10 +53,14 @@ pub enum LayoutError {
     )]
     Order,
     /// The rotations are not six digits of quarters.
-    #[error("expected six digits from 0 to 3, quarters clockwise, in the order of the sides, such as 000000")]
+    #[error(
+        "expected six digits from 0 to 3, quarters clockwise, in the order of the sides, such as 000000"
+    )]
     Rotations,
     /// The layout has its own order.
-    #[error("the sides of {0} have one order; --order and --rotations are for 6x1, 1x6, 3x2 and 2x3")]
+    #[error(
+        "the sides of {0} have one order; --order and --rotations are for 6x1, 1x6, 3x2 and 2x3"
+    )]
     FixedOrder(&'static str),
 }
 

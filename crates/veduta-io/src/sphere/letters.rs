@@ -88,14 +88,25 @@ mod tests {
     #[test]
     fn a_text_stands_around_its_centre() {
         let centre = DVec2::new(3.0, 5.0);
-        for text in ["FRONT", "RIGHT", "BACK", "LEFT", "UP", "DOWN", "0123456789-"] {
+        for text in [
+            "FRONT",
+            "RIGHT",
+            "BACK",
+            "LEFT",
+            "UP",
+            "DOWN",
+            "0123456789-",
+        ] {
             let strokes = strokes(text, centre, 2.0);
             let corners = strokes.iter().flatten();
             let (low, high) = corners.fold((centre, centre), |(low, high), corner| {
                 (low.min(*corner), high.max(*corner))
             });
             assert!((high.y - low.y - 2.0).abs() < 1e-12, "{text}");
-            assert!((0.5 * (high + low) - centre).length() < 0.2, "{text}: {low} {high}");
+            assert!(
+                (0.5 * (high + low) - centre).length() < 0.2,
+                "{text}: {low} {high}"
+            );
             for stroke in &strokes {
                 assert_eq!(distance(std::slice::from_ref(stroke), stroke[0]), 0.0);
             }

@@ -26,8 +26,8 @@ pub use layout::{Cell, Layout, LayoutError, ShapeError, Spacing, USUAL_ORDER, si
 pub use side::{Side, Turn};
 pub use test_card::test_card;
 pub use views::{
-    SideForm, View, ViewsError, finest_pixel, one_lens, orientation_of, side_projection, sides_in_files,
-    sides_in_layout, two_discs,
+    SideForm, View, ViewsError, finest_pixel, one_lens, orientation_of, side_projection,
+    sides_in_files, sides_in_layout, two_discs,
 };
 
 use veduta::reproject::Orientation;

@@ -2,9 +2,9 @@
 //!
 //! What is planned here depends on the sizes of pictures only, so that all frames of a sequence share it.
 
+use super::Panorama;
 use super::layout::{Layout, ShapeError, Spacing};
 use super::side::{Side, Turn};
-use super::Panorama;
 use std::f64::consts::{FRAC_PI_2, PI};
 use veduta::accumulate::Picture;
 use veduta::geometry::DVec3;
@@ -114,7 +114,9 @@ pub enum ViewsError {
         height: u32,
     },
     /// Padding leaves nothing of a side.
-    #[error("has sides of {side} pixels, of which a padding of {padding} on each edge leaves nothing")]
+    #[error(
+        "has sides of {side} pixels, of which a padding of {padding} on each edge leaves nothing"
+    )]
     Padding {
         /// In pixels.
         side: u32,
@@ -122,7 +124,9 @@ pub enum ViewsError {
         padding: u32,
     },
     /// Sides whose angles are even end at 90 degrees.
-    #[error("has sides of even angles (eac), which are known without padding and of 90 degrees only")]
+    #[error(
+        "has sides of even angles (eac), which are known without padding and of 90 degrees only"
+    )]
     PaddedAngles,
     /// Two discs side by side.
     #[error("has {width} x {height} pixels; two fisheyes side by side are twice as wide as high")]
@@ -295,7 +299,9 @@ pub fn two_discs(
 pub fn finest_pixel(views: &[View]) -> f64 {
     let pixel = |view: &View| {
         let lens = view.projection.lens;
-        let middle = view.projection.image_from_lens(veduta::geometry::DVec2::ZERO);
+        let middle = view
+            .projection
+            .image_from_lens(veduta::geometry::DVec2::ZERO);
         match lens {
             // In the middle of a ball stands who looks: what matters is around.
             Lens::Ball => Some(PI / f64::from(view.projection.width)),

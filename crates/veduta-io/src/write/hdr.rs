@@ -10,7 +10,9 @@ pub fn write(writer: &mut impl Write, picture: &Picture) -> Result<(), WriteProb
     // The encoder takes bytes; what is no number would become any.
     let light = |value: f32| if value > 0.0 { value.min(MOST) } else { 0.0 };
     let channels = picture.pixels.iter().flat_map(|&[r, g, b, _]| [r, g, b]);
-    let bytes: Vec<u8> = channels.flat_map(|value| light(value).to_ne_bytes()).collect();
+    let bytes: Vec<u8> = channels
+        .flat_map(|value| light(value).to_ne_bytes())
+        .collect();
     HdrEncoder::new(writer)
         .write_image(
             &bytes,

@@ -36,9 +36,7 @@ pub fn write(
 fn after_jfif(coded: &[u8]) -> usize {
     const START: usize = 2;
     match coded.get(START..START + 4) {
-        Some(&[0xff, 0xe0, high, low]) => {
-            START + 2 + usize::from(u16::from_be_bytes([high, low]))
-        }
+        Some(&[0xff, 0xe0, high, low]) => START + 2 + usize::from(u16::from_be_bytes([high, low])),
         _ => START,
     }
     .min(coded.len())
@@ -49,5 +47,11 @@ fn xmp_segment(packet: &str) -> Result<Vec<u8>, WriteProblem> {
     const NAME: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
     let length = u16::try_from(2 + NAME.len() + packet.len())
         .map_err(|_| WriteProblem::Encode("its description is too long for a .jpg".into()))?;
-    Ok([&[0xff, 0xe1], &length.to_be_bytes(), NAME, packet.as_bytes()].concat())
+    Ok([
+        &[0xff, 0xe1],
+        &length.to_be_bytes(),
+        NAME,
+        packet.as_bytes(),
+    ]
+    .concat())
 }

@@ -1,6 +1,6 @@
 use super::{Samples, WriteProblem, coded};
-use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use crate::sphere::Panorama;
+use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use std::io::Write;
 use veduta::accumulate::Picture;
 

@@ -165,8 +165,7 @@ impl Planes {
                 let start = half.start(row) + channel * half.stride;
                 let results = &mut half.samples[start..start + width as usize];
                 for (column, result) in results.iter_mut().enumerate() {
-                    let along =
-                        [0, 1, 2, 3].map(|k| binomial(a, b, c, d, 2 * column + k));
+                    let along = [0, 1, 2, 3].map(|k| binomial(a, b, c, d, 2 * column + k));
                     *result = weighted(along);
                 }
             }
@@ -225,7 +224,11 @@ mod tests {
         for row in planes.rows() {
             for column in planes.columns() {
                 let set = row == 1 && (0..3).contains(&column);
-                let expected = if set { [7.0; 4] } else { [column as f32, row as f32, 1.0, 0.5] };
+                let expected = if set {
+                    [7.0; 4]
+                } else {
+                    [column as f32, row as f32, 1.0, 0.5]
+                };
                 assert_eq!(planes.texel(column, row), expected, "{column} {row}");
             }
         }

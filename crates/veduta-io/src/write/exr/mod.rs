@@ -118,11 +118,7 @@ pub fn write(
 /// For vectors that stand to the left of the matrix; in both spaces x is right, y up and z forward.
 fn world_to_camera(orientation: &Orientation) -> [f32; 16] {
     // The inverse of a rotation is its transpose, and row vectors transpose once more.
-    let axes = [
-        orientation.right(),
-        orientation.up(),
-        orientation.forward(),
-    ];
+    let axes = [orientation.right(), orientation.up(), orientation.forward()];
     let [right, up, forward] = axes.map(|axis| [axis.x, axis.y, -axis.z].map(|v| v as f32));
     let row = |k: usize| [right[k], up[k], forward[k], 0.0];
     let rows = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
