@@ -43,7 +43,8 @@ pub fn test_card(side: Side, size: u32) -> Picture {
             let at = DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5) * pixel;
             let is_odd = chequer(at, pixel);
             let mut color = mix(shades[0], shades[1], is_odd);
-            let border = at.min(DVec2::ONE - at).min_element() - 1.0 / 64.0;
+            // At least a pixel wide, so that sides fit together whatever their shades.
+            let border = at.min(DVec2::ONE - at).min_element() - pixel.max(1.0 / 64.0);
             let lines = [
                 border,
                 distance(thick, at) - 0.012,
