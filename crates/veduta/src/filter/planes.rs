@@ -14,6 +14,7 @@ pub struct Planes {
     height: u32,
     channels: usize,
     apron: u32,
+    repeats: bool,
     /// From a row to the next of the same channel's, and from a channel's to the next channel's, samples.
     stride: usize,
     /// Row by row, in a row channel by channel: the rows of one footprint lie near one another.
@@ -36,9 +37,21 @@ impl Planes {
             height,
             channels,
             apron,
+            repeats: false,
             stride,
             samples: vec![0.0; rows * channels * stride],
         }
+    }
+
+    /// Planes whose columns repeat: right of the last comes the first again, as in a panorama all around.
+    pub fn repeating(mut self) -> Self {
+        self.repeats = true;
+        self
+    }
+
+    /// Whether columns repeat.
+    pub fn repeats(&self) -> bool {
+        self.repeats
     }
 
     /// Width without the apron.
@@ -154,6 +167,8 @@ impl Planes {
         assert!(self.apron >= 2, "an apron for the weights");
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut half = Self::new(width, height, self.channels, apron);
+        // An odd number of columns does not repeat after half of them.
+        half.repeats = self.repeats && self.width % 2 == 0;
         for row in 0..height as i32 {
             for channel in 0..self.channels {
                 let of_row = |offset: i32| {
