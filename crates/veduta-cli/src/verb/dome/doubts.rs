@@ -2,8 +2,7 @@
 
 use super::source::Frame;
 use veduta::accumulate::Picture;
-use veduta::geometry::{DVec2, DVec3};
-use veduta::reproject::{Lens, Projection};
+use veduta::reproject::Lens;
 use veduta_io::sphere::{Change, Side, View, fit};
 
 /// Sentences about what seems wrong with the views of a frame.
@@ -77,83 +76,31 @@ fn in_words(changes: &[Change]) -> String {
     changes.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Points along a side of a picture at which it is asked what is seen there: a hundredth of a percent of a
-/// picture is not told.
-const SAMPLES: u32 = 256;
-/// Less than this share of a picture is a rim.
+/// Less than this share of a picture is the rim of a lens.
 const LEAST_SHARE: f64 = 0.0005;
 
-/// What pictures show that no view shows, and its share of them: by sides of a cube.
-pub fn missing(views: &[View], targets: &[Projection]) -> Vec<(String, f64)> {
-    let mut counts = [0_u32; 6];
-    let mut all = 0_u32;
-    for target in targets {
-        let size = DVec2::new(f64::from(target.width), f64::from(target.height));
-        let step = size / f64::from(SAMPLES);
-        for k in 0..SAMPLES * SAMPLES {
-            let at = DVec2::new(f64::from(k % SAMPLES) + 0.5, f64::from(k / SAMPLES) + 0.5) * step;
-            if !target.covers(at) {
-                continue;
-            }
-            let Some(direction) = target.direction(at) else {
-                continue;
-            };
-            all += 1;
-            if !views.iter().any(|view| shows(&view.projection, direction)) {
-                counts[side_of(direction).index()] += 1;
-            }
-        }
-    }
-    let share = |side: Side| f64::from(counts[side.index()]) / f64::from(all.max(1));
+/// What pictures show that no view shows, and its share of them; `found` by names of sides of a cube.
+pub fn missing(views: &[View], found: Vec<(&str, f64)>) -> Vec<(String, f64)> {
     let are_sides = views.iter().all(|view| view.side.is_some());
-    let missing = Side::ALL
-        .into_iter()
-        .filter(|&side| share(side) > LEAST_SHARE);
-    let what = |side: Side| {
-        let is_there = views.iter().any(|view| view.side == Some(side));
+    let what = |name: &str| {
+        let is_there = views.iter().any(|view| view.name == name);
         match are_sides && !is_there {
-            true => format!("the side {side}"),
-            false => format!("all that is {}", place(side)),
+            true => format!("the side {name}"),
+            false => format!("all that is {}", place(name)),
         }
     };
-    missing.map(|side| (what(side), share(side))).collect()
+    let found = found.into_iter().filter(|(_, share)| *share > LEAST_SHARE);
+    found.map(|(name, share)| (what(name), share)).collect()
 }
 
 /// Where a side is, in words.
-fn place(side: Side) -> &'static str {
-    match side {
-        Side::Front => "in front",
-        Side::Right => "to the right",
-        Side::Back => "behind",
-        Side::Left => "to the left",
-        Side::Up => "above",
-        Side::Down => "below",
-    }
-}
-
-/// Whether a view shows a direction, its last half pixel counted generously.
-fn shows(view: &Projection, direction: DVec3) -> bool {
-    let Some(image) = view.image(direction) else {
-        return false;
-    };
-    let size = DVec2::new(f64::from(view.width), f64::from(view.height));
-    let inside = image.cmpge(DVec2::splat(-1.0)).all() && image.cmple(size + 1.0).all();
-    inside
-        && view
-            .lens
-            .covers(view.lens_from_image(image.clamp(DVec2::ZERO, size)))
-}
-
-/// The side of a cube that a direction goes through.
-fn side_of(direction: DVec3) -> Side {
-    let [x, y, z] = direction.to_array();
-    let most = direction.abs().max_element();
-    match () {
-        () if -z == most => Side::Front,
-        () if z == most => Side::Back,
-        () if x == most => Side::Right,
-        () if -x == most => Side::Left,
-        () if y == most => Side::Up,
-        () => Side::Down,
+fn place(name: &str) -> &'static str {
+    match name {
+        "front" => "in front",
+        "right" => "to the right",
+        "back" => "behind",
+        "left" => "to the left",
+        "up" => "above",
+        _ => "below",
     }
 }

@@ -1,84 +1,131 @@
-//! TEMPORARY until the filter is there: point samples.
+//! What is seen where, for all pictures of one eye, and the filter that makes them.
 
-use crate::exit::Failure;
-use clap::Args;
-use rayon::prelude::*;
+use clap::{Args, ValueEnum};
 use veduta::accumulate::Picture;
-use veduta::geometry::DVec2;
-use veduta::reproject::Projection;
+use veduta::filter::ewa::{Ewa, Profile};
+use veduta::reproject::{Projection, Reprojection, Views};
 
+/// How the texels of the views become pixels.
 #[derive(Debug, Args)]
-pub struct Filtering {}
+#[command(next_help_heading = "Filter")]
+pub struct Filtering {
+    /// How texels are weighed within the footprint of a pixel
+    #[arg(long, value_name = "NAME", default_value = "auto")]
+    kernel: Kernel,
+    /// How exact footprints of many texels are: two levels of a pyramid stand in for them, the finer the more
+    /// exact; full weighs every texel
+    #[arg(long, value_name = "HOW", default_value = "good")]
+    precision: Precision,
+}
 
+/// `--kernel`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Kernel {
+    /// Sharp where views are magnified, gaussian where they are reduced
+    Auto,
+    /// That of Greene & Heckbert: soft, and nothing gets darker or brighter than the views are
+    Gaussian,
+    /// As sharp as pixels of exact area
+    Sharp,
+    /// ImageMagick's
+    Robidoux,
+    /// Mitchell & Netravali's
+    Mitchell,
+}
+
+/// `--precision`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Precision {
+    /// For a first look
+    Draft,
+    /// For pictures
+    Good,
+    /// For masters
+    Master,
+    /// Every texel
+    Full,
+}
+
+impl Filtering {
+    fn ewa(&self) -> Ewa {
+        Ewa {
+            profile: match self.kernel {
+                Kernel::Auto => Profile::Auto,
+                Kernel::Gaussian => Profile::Gaussian,
+                Kernel::Sharp => Profile::Sharp,
+                Kernel::Robidoux => Profile::Robidoux,
+                Kernel::Mitchell => Profile::Mitchell,
+            },
+            pyramid: match self.precision {
+                Precision::Draft => Some(2.0),
+                Precision::Good => Some(3.0),
+                Precision::Master => Some(4.0),
+                Precision::Full => None,
+            },
+            ..Ewa::default()
+        }
+    }
+}
+
+/// What is seen where in the pictures of one eye: for all frames of a sequence.
 pub struct Geometry {
-    views: Vec<Projection>,
-    targets: Vec<Projection>,
+    parts: Vec<Part>,
+}
+
+/// One picture.
+struct Part {
+    reprojection: Reprojection,
+    /// The room for the views' pictures, from frame to frame.
+    views: Option<Views>,
 }
 
 impl Geometry {
-    pub fn new(
-        views: &[Projection],
-        targets: &[Projection],
-        _: &Filtering,
-    ) -> Result<Self, Failure> {
-        Ok(Self {
-            views: views.to_vec(),
-            targets: targets.to_vec(),
-        })
+    /// Works out where the pixels of `targets` lie in `views`.
+    pub fn new(views: &[Projection], targets: &[Projection], filtering: &Filtering) -> Self {
+        let ewa = filtering.ewa();
+        let part = |target: &Projection| Part {
+            reprojection: Reprojection::new(views, target, &ewa),
+            views: None,
+        };
+        Self {
+            parts: targets.iter().map(part).collect(),
+        }
     }
 
-    pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
-        self.targets
-            .iter()
-            .map(|target| {
-                let pixel = |k: u32| {
-                    let (x, y) = (k % target.width, k / target.width);
-                    let coverage = target.coverage(x, y) as f32;
-                    let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                    let found = (|| {
-                        let direction = target.direction(at)?;
-                        let mut best = (f64::NEG_INFINITY, None);
-                        for (view, picture) in self.views.iter().zip(views) {
-                            let along = view.axis().dot(direction);
-                            let Some(image) = view.image(direction) else {
-                                continue;
-                            };
-                            let size = DVec2::new(f64::from(view.width), f64::from(view.height));
-                            let inside = image.cmpge(DVec2::ZERO - 1e-6).all()
-                                && image.cmple(size + 1e-6).all();
-                            if inside
-                                && view.lens.covers(view.lens_from_image(image))
-                                && along > best.0
-                            {
-                                let p = (image - 0.5).clamp(DVec2::ZERO, size - 1.0);
-                                let i = p.floor();
-                                let f = p - i;
-                                let texel = |dx: f64, dy: f64| {
-                                    let q = (i + DVec2::new(dx, dy)).min(size - 1.0);
-                                    picture.pixels
-                                        [q.y as usize * view.width as usize + q.x as usize]
-                                };
-                                let mix = |a: [f32; 4], b: [f32; 4], t: f64| -> [f32; 4] {
-                                    std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t as f32)
-                                };
-                                let top = mix(texel(0.0, 0.0), texel(1.0, 0.0), f.x);
-                                let low = mix(texel(0.0, 1.0), texel(1.0, 1.0), f.x);
-                                best = (along, Some(mix(top, low, f.y)));
-                            }
-                        }
-                        best.1
-                    })();
-                    found.unwrap_or([0.0; 4]).map(|v| v * coverage)
-                };
-                Picture {
-                    width: target.width,
-                    height: target.height,
-                    pixels: (0..target.width * target.height)
-                        .into_par_iter()
-                        .map(pixel)
-                        .collect(),
+    /// What no view shows: names of sides of a cube, and their shares of all pictures.
+    pub fn missing(&self) -> Vec<(&'static str, f64)> {
+        let mut sums: Vec<(&'static str, f64)> = Vec::new();
+        for part in &self.parts {
+            for (name, share) in part.reprojection.missing().toward {
+                let share = share / self.parts.len() as f64;
+                match sums.iter_mut().find(|(known, _)| *known == name) {
+                    Some((_, sum)) => *sum += share,
+                    None => sums.push((name, share)),
                 }
-            })
-            .collect()
+            }
+        }
+        sums.sort_by(|a, b| b.1.total_cmp(&a.1));
+        sums
+    }
+
+    /// Makes the pictures of a frame from those of its views.
+    pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
+        let is_opaque = |picture: &Picture| picture.pixels.iter().all(|pixel| pixel[3] == 1.0);
+        let opaque = views.iter().all(is_opaque);
+        let is_alone = self.parts.len() == 1;
+        let make = |part: &mut Part| {
+            let channels = if opaque { 3 } else { 4 };
+            let kept = part.views.take().filter(|kept| kept.channels() == channels);
+            let mut planes = kept.unwrap_or_else(|| part.reprojection.views(opaque));
+            for (view, picture) in views.iter().enumerate() {
+                planes.set(view, picture);
+            }
+            planes.complete();
+            let picture = part.reprojection.picture(&planes);
+            // The room of six sides at once would be too much.
+            part.views = is_alone.then_some(planes);
+            picture
+        };
+        self.parts.iter_mut().map(make).collect()
     }
 }

@@ -444,9 +444,11 @@ impl Dome {
             .iter()
             .map(|(_, projection)| *projection)
             .collect();
+        let projections: Vec<_> = views.iter().map(|view| view.projection).collect();
+        let geometry = Geometry::new(&projections, &targets, &self.filtering);
         let missing = match views.is_empty() {
             true => Vec::new(),
-            false => doubts::missing(&views, &targets),
+            false => doubts::missing(&views, geometry.missing()),
         };
         for (what, share) in &missing {
             let share = 100.0 * share;
@@ -455,8 +457,6 @@ impl Dome {
             );
             warn(message, self.strict, talk)?;
         }
-        let projections: Vec<_> = views.iter().map(|view| view.projection).collect();
-        let geometry = Geometry::new(&projections, &targets, &self.filtering)?;
         Ok(Seen {
             sizes,
             views,
