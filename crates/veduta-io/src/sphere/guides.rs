@@ -55,7 +55,7 @@ pub fn draw_guides(picture: &mut Picture, projection: &Projection, guides: &[Gui
                 let away = match guide {
                     Guide::Alignment => place
                         .from_grid()
-                        .min(distance(&names, at) - width)
+                        .min(distance(&names, at) - 0.3 * width)
                         .min(rim(projection, at)),
                     Guide::SafeArea => place.from_safe_area(),
                 };

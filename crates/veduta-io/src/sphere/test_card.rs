@@ -89,8 +89,8 @@ fn drawing(side: Side) -> (Vec<Stroke>, Vec<Stroke>) {
     let mut thin = Vec::new();
     let [forward, right, up] = side.axes();
     for (towards, place) in [
-        (right, at(0.87, 0.5)),
-        (right.map(|v| -v), at(0.13, 0.5)),
+        (right, at(0.87, 0.42)),
+        (right.map(|v| -v), at(0.13, 0.42)),
         (up, at(0.5, 0.07)),
         (up.map(|v| -v), at(0.5, 0.93)),
     ] {

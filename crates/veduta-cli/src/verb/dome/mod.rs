@@ -58,7 +58,7 @@ pub struct Dome {
     guides: Vec<GuideArgument>,
     /// What lies behind: a colour or none; black by default for .jpg
     #[arg(long, value_name = "COLOUR", value_parser = background)]
-    background: Option<Option<[f32; 3]>>,
+    background: Option<Behind>,
     /// Make every warning an error
     #[arg(long)]
     strict: bool,
@@ -100,11 +100,14 @@ enum GuideArgument {
     SafeArea,
 }
 
-/// `--background`
-fn background(text: &str) -> Result<Option<[f32; 3]>, String> {
+/// `--background`: a linear colour, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Behind(Option<[f32; 3]>);
+
+fn background(text: &str) -> Result<Behind, String> {
     match text.parse() {
-        Ok(Background::None) => Ok(None),
-        Ok(Background::Color(color)) => Ok(Some(color)),
+        Ok(Background::None) => Ok(Behind(None)),
+        Ok(Background::Color(color)) => Ok(Behind(Some(color))),
         _ => Err("expected none, or a colour such as '#000' (in quotes)".into()),
     }
 }
@@ -486,7 +489,7 @@ impl Dome {
         }
         // What is around a dome is dark, also where a format cannot leave it open.
         let black = (format == PictureFormat::Jpeg).then_some([0.0; 3]);
-        if let Some(color) = self.background.unwrap_or(black) {
+        if let Some(color) = self.background.map_or(black, |behind| behind.0) {
             tone::lay_on(picture, color);
         }
     }

@@ -299,14 +299,15 @@ impl Aim {
             Some(Asked::Width(width)) => width,
             None => {
                 // The angle across a pixel in the middle, or what is half as far from it as the rim.
-                const PROBE: u32 = 1024;
-                let probe = Projection::new(lens, Orientation::default(), PROBE, PROBE);
+                const PROBE: u32 = 4096;
+                let height = (f64::from(PROBE) / lens.aspect()).round().max(1.0) as u32;
+                let probe = Projection::new(lens, Orientation::default(), PROBE, height);
                 let at = match lens {
                     Lens::Ball => DVec2::new(0.5, 0.0),
                     _ => DVec2::ZERO,
                 };
                 let ray = probe.ray(probe.image_from_lens(at));
-                let angle = ray.map_or(finest, |ray| ray.derivatives[1].length());
+                let angle = ray.map_or(finest, |ray| ray.derivatives[0].length());
                 let width = f64::from(PROBE) * angle / finest;
                 // Even, since videos are; to whole ones within rounding.
                 let width = 2.0 * (0.5 * width - 1e-6).ceil();
