@@ -83,6 +83,7 @@ enum Verb {
     Render(Box<verb::render::Render>),
     Shade(Box<verb::shade::Shade>),
     Composite(Box<verb::composite::Composite>),
+    Dome(Box<verb::dome::Dome>),
     Frames(Box<verb::frames::Frames>),
     Info(Box<verb::info::Info>),
     Check(verb::check::Check),
@@ -159,6 +160,7 @@ fn run(arguments: Arguments) -> Result<Ending, Failure> {
         Verb::Composite(composite) => composite
             .run(common.force, common.json, &mut talk)
             .map(fine),
+        Verb::Dome(dome) => dome.run(common.json, &mut talk).map(fine),
         Verb::Frames(frames) => frames.run(common.force, common.json, &mut talk).map(fine),
         Verb::Info(info) => info.run(common.json, &mut talk).map(fine),
         Verb::Check(check) => check.run(common.json, &mut talk),

@@ -79,6 +79,12 @@ fn radians(text: &str) -> Option<f64> {
     Some(degrees.to_radians())
 }
 
+/// Any finite angle, in radians: `-11deg`, `90` or `0.5rad`.
+pub fn angle(text: &str) -> Result<f64, String> {
+    let angle = radians(text).filter(|angle| angle.is_finite());
+    angle.ok_or_else(|| "expected an angle such as 11deg or 0.5rad".into())
+}
+
 /// `X,Y,Z`, finite.
 pub fn vector(text: &str) -> Result<DVec3, String> {
     let numbers: Option<Vec<f64>> = text

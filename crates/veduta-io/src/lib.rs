@@ -38,6 +38,7 @@ mod read;
 mod read_picture;
 mod reason;
 mod scale;
+pub mod sphere;
 pub mod tone;
 mod write;
 
@@ -69,11 +70,16 @@ pub use read::{
     Animation, AnimationKind, Detail, ErrorKind, Excerpt, Loaded, Moment, Place, Problem,
     ReadError, ReadOptions, SCENE_SUFFIXES, SceneOverTime, UpAxis, Warning, read_scene,
 };
+#[cfg(feature = "toml")]
+pub use read::{
+    FileView, change_scene, closest_name, read_views_file, scene_file_schema, set_in_scene,
+    views_file_schema,
+};
 #[cfg(feature = "cityjson")]
 pub use read::{LevelOfDetail, LevelOfDetailError};
-#[cfg(feature = "toml")]
-pub use read::{change_scene, closest_name, scene_file_schema, set_in_scene};
-pub use read_picture::{LoadedPicture, PictureProblem, ReadPictureError, read_picture};
+pub use read_picture::{
+    LoadedPicture, PictureProblem, ReadPictureError, read_linear_picture, read_picture,
+};
 pub use reason::reason;
 pub use scale::scaled;
 pub use write::{

@@ -1,5 +1,6 @@
 //! `veduta frames`: the pictures of an animation, one after the other.
 
+use super::frame_names::FrameNames;
 use super::look::{Development, Look};
 use super::output::{Output, Target};
 use super::render::View;
@@ -389,66 +390,5 @@ fn in_words(work: &FrameWork) -> String {
         Extent::Parts => format!("found of it: {}", work.found.join(", ")),
         Extent::Nothing => "the same as before".into(),
         _ => "all found".into(),
-    }
-}
-
-/// The names of the frames' files.
-struct FrameNames<'a> {
-    pattern: &'a Path,
-    /// The file's name before and after the number's digits, and their count, if it has any.
-    number: Option<(String, usize, String)>,
-}
-
-impl<'a> FrameNames<'a> {
-    /// Names by a pattern with `#` for digits, which `several` frames need.
-    fn of(pattern: &'a Path, several: bool) -> Result<Self, Failure> {
-        let usage = |problem: &str| {
-            let message = format!("{}: {problem}", pattern.display());
-            Err(Failure::new(Code::Usage, message))
-        };
-        if pattern.as_os_str() == "-" {
-            return usage("frames are files; name them, such as out.####.png");
-        }
-        let Some(name) = pattern.file_name().and_then(|name| name.to_str()) else {
-            return usage("frames are named by text, such as out.####.png");
-        };
-        let number = name.rfind('#').map(|last| {
-            let before = name[..last].trim_end_matches('#');
-            let digits = last + 1 - before.len();
-            (before.to_owned(), digits, name[last + 1..].to_owned())
-        });
-        if number.is_none() && several {
-            return usage("frames need # where their numbers come, such as out.####.png");
-        }
-        Ok(Self { pattern, number })
-    }
-
-    fn path(&self, frame: u32) -> PathBuf {
-        match &self.number {
-            None => self.pattern.to_owned(),
-            Some((before, digits, after)) => {
-                let name = format!("{before}{frame:0width$}{after}", width = *digits);
-                self.pattern.with_file_name(name)
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_have_their_numbers_in_their_names() {
-        let name = |pattern: &str, frame| {
-            let names = FrameNames::of(Path::new(pattern), true).expect("has a number");
-            names.path(frame).to_string_lossy().into_owned()
-        };
-        assert_eq!(name("out.####.png", 7), "out.0007.png");
-        assert_eq!(name("a/b#c##.exr", 123), "a/b#c123.exr");
-        assert_eq!(name("#.png", 0), "0.png");
-        assert!(FrameNames::of(Path::new("a#/out.png"), true).is_err());
-        let one = FrameNames::of(Path::new("out.png"), false).expect("one frame needs none");
-        assert_eq!(one.path(9), Path::new("out.png"));
     }
 }

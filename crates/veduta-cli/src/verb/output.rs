@@ -10,6 +10,7 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use veduta::accumulate::{AovSettings, Picture};
 use veduta_io::deep_exr::DeepCompression;
+use veduta_io::sphere::Panorama;
 use veduta_io::{
     ExrCompression, Layers, PICTURE_SUFFIXES, PictureFormat, PictureOptions, Samples,
     VECTOR_SUFFIXES, VectorFormat, WriteProblem, is_map, reason, stream_layers, stream_picture,
@@ -347,6 +348,7 @@ impl Output {
                 Some(CompressionArgument::Piz) => ExrCompression::Piz,
             },
             exr_tile: self.tile,
+            panorama: None,
         }
     }
 }
@@ -363,6 +365,17 @@ impl Target {
             format,
             options,
         })
+    }
+
+    /// The format.
+    pub fn format(&self) -> PictureFormat {
+        self.format
+    }
+
+    /// The same for a picture that tells of itself as one of a sphere.
+    pub fn of_panorama(mut self, panorama: Option<Panorama>) -> Self {
+        self.options.panorama = panorama;
+        self
     }
 
     /// Fails if the format has no pictures of that size.

@@ -7,6 +7,7 @@ const VERBS: &[&str] = &[
     "render",
     "shade",
     "composite",
+    "dome",
     "frames",
     "info",
     "check",

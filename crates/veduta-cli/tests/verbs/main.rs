@@ -4,6 +4,7 @@ mod casters;
 mod check;
 mod deep;
 mod diff;
+mod dome;
 mod endings;
 mod examples;
 mod filters;
@@ -87,6 +88,12 @@ impl Folder {
     fn told(&self, arguments: &str) -> String {
         let output = self.veduta(arguments).assert().success();
         String::from_utf8(output.get_output().stdout.clone()).expect("text")
+    }
+
+    /// [`Folder::told`] of what is no text.
+    fn told_bytes(&self, arguments: &str) -> Vec<u8> {
+        let output = self.veduta(arguments).assert().success();
+        output.get_output().stdout.clone()
     }
 
     /// [`Folder::told`] with `--json`.

@@ -52,7 +52,9 @@ pub use moment::{Animation, AnimationKind, Moment};
 pub use names::closest as closest_name;
 pub use over_time::SceneOverTime;
 #[cfg(feature = "toml")]
-pub use scene_file::{change_scene, scene_file_schema, set_in_scene};
+pub use scene_file::{
+    FileView, change_scene, read_views_file, scene_file_schema, set_in_scene, views_file_schema,
+};
 
 use budget::Budget;
 use error::{Fault, Warnings};

@@ -1,6 +1,7 @@
 //! What all picture readers end in: a table of samples, made one kind of picture.
 
 use super::LoadedPicture;
+use crate::sphere::Panorama;
 use crate::tone::linear_from_srgb;
 use rayon::prelude::*;
 use veduta::accumulate::Picture;
@@ -16,6 +17,8 @@ pub struct Decoded {
     pub samples: Samples,
     /// Whether colour is multiplied by opacity.
     pub premultiplied: bool,
+    /// See [`LoadedPicture::panorama`].
+    pub panorama: Option<Panorama>,
     /// See [`LoadedPicture::further_channels`].
     pub further_channels: Vec<String>,
     pub warnings: Vec<String>,
@@ -43,12 +46,29 @@ impl Channels {
     }
 }
 
+/// What numbers of 8 and 16 bits are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coding {
+    Srgb,
+    /// Light as it is.
+    Linear,
+}
+
+impl Coding {
+    fn light(self, value: f32) -> f32 {
+        match self {
+            Self::Srgb => linear_from_srgb(value),
+            Self::Linear => value,
+        }
+    }
+}
+
 /// The table.
 #[derive(Debug)]
 pub enum Samples {
-    /// sRGB.
+    /// Of a [`Coding`].
     U8(Vec<u8>),
-    /// sRGB.
+    /// Of a [`Coding`].
     U16(Vec<u16>),
     /// Linear.
     F32(Vec<f32>),
@@ -56,19 +76,19 @@ pub enum Samples {
 
 impl Decoded {
     /// Makes it linear and premultiplied.
-    pub fn finish(self) -> LoadedPicture {
-        let linear = matches!(self.samples, Samples::F32(_));
+    pub fn finish(self, coding: Coding) -> LoadedPicture {
+        let linear = matches!(self.samples, Samples::F32(_)) || coding == Coding::Linear;
         let pixels = match &self.samples {
             Samples::U8(samples) => {
                 let table: Vec<f32> = (0..=255u8)
-                    .map(|value| linear_from_srgb(f32::from(value) / 255.0))
+                    .map(|value| coding.light(f32::from(value) / 255.0))
                     .collect();
                 let light = |value: u8| table[usize::from(value)];
                 self.pixels(samples, light, |value| f32::from(value) / 255.0)
             }
             Samples::U16(samples) => {
                 let unit = |value: u16| f32::from(value) / 65_535.0;
-                self.pixels(samples, |value| linear_from_srgb(unit(value)), unit)
+                self.pixels(samples, |value| coding.light(unit(value)), unit)
             }
             Samples::F32(samples) => self.pixels(samples, |value| value, |value| value),
         };
@@ -79,6 +99,7 @@ impl Decoded {
                 pixels,
             },
             linear,
+            panorama: self.panorama,
             further_channels: self.further_channels,
             warnings: self.warnings,
         }

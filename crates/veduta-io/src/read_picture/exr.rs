@@ -1,10 +1,13 @@
 use super::decoded::{Channels, Decoded, Samples};
 use super::{PictureProblem, check_size};
 use crate::deep_exr::{self, DeepFile, DeepProblem};
+use crate::sphere::Panorama;
 use exr::error::Error;
 use exr::meta::MetaData;
+use exr::meta::attribute::EnvironmentMap;
 use exr::prelude::{ReadChannels, ReadLayers};
 use std::io::Cursor;
+use veduta::reproject::Orientation;
 
 /// Reads the first layer that has R, G and B, with A if it has it; of a deep file the first deep part,
 /// made flat.
@@ -41,6 +44,7 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         .collect();
     further.sort();
     further.dedup();
+    let environment = image.layer_data.attributes.environment_map;
     let (size, pixels) = image.layer_data.channel_data.pixels;
     let (width, height) = check_size(size.0 as u64, size.1 as u64, bytes.len())?;
     Ok(Decoded {
@@ -49,6 +53,12 @@ pub fn read(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         channels: Channels::ColorOpacity,
         samples: Samples::F32(pixels.into_flattened()),
         premultiplied: true,
+        panorama: environment.map(|kind| match kind {
+            EnvironmentMap::LatitudeLongitude => Panorama::ExrLatLong {
+                orientation: Orientation::default(),
+            },
+            EnvironmentMap::Cube => Panorama::ExrCube,
+        }),
         further_channels: further,
         warnings: Vec::new(),
     })
@@ -71,6 +81,7 @@ fn read_deep(bytes: Vec<u8>) -> Result<Decoded, PictureProblem> {
         channels: Channels::ColorOpacity,
         samples: Samples::F32(picture.pixels.into_flattened()),
         premultiplied: true,
+        panorama: None,
         further_channels: Vec::new(),
         warnings,
     })

@@ -10,7 +10,7 @@ mod decoded;
 mod exr;
 mod npy;
 mod pfm;
-#[cfg(any(feature = "png", feature = "jpeg", feature = "webp"))]
+#[cfg(any(feature = "png", feature = "jpeg", feature = "webp", feature = "hdr"))]
 mod raster;
 #[cfg(feature = "tiff")]
 mod tiff;
@@ -19,7 +19,9 @@ mod tiff;
 pub(crate) use exr::problem as exr_problem;
 
 use crate::PictureFormat;
+use crate::sphere::Panorama;
 use crate::write::known_suffixes;
+use decoded::Coding;
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
 
@@ -30,6 +32,8 @@ pub struct LoadedPicture {
     pub picture: Picture,
     /// Whether the file holds light as it is (floating point), rather than sRGB for a display.
     pub linear: bool,
+    /// What the file tells of it as a picture of a sphere.
+    pub panorama: Option<Panorama>,
     /// Names of the channels that the file has beside the picture's own, ascending: those of an EXR,
     /// which stay unread.
     pub further_channels: Vec<String>,
@@ -94,6 +98,18 @@ pub enum PictureProblem {
 /// # Errors
 /// When the file cannot be read, is damaged, or of a kind that is not read. Never panics.
 pub fn read_picture(path: &Path) -> Result<LoadedPicture, ReadPictureError> {
+    read(path, Coding::Srgb)
+}
+
+/// [`read_picture`], but that numbers of 8 and 16 bits are taken as light as it is, not as sRGB.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_linear_picture(path: &Path) -> Result<LoadedPicture, ReadPictureError> {
+    read(path, Coding::Linear)
+}
+
+fn read(path: &Path, coding: Coding) -> Result<LoadedPicture, ReadPictureError> {
     let read = || {
         let Ok(format) = PictureFormat::of(path) else {
             return Err(PictureProblem::UnknownFormat(known_suffixes()));
@@ -112,8 +128,10 @@ pub fn read_picture(path: &Path) -> Result<LoadedPicture, ReadPictureError> {
             PictureFormat::Exr => exr::read(bytes),
             PictureFormat::Pfm => pfm::read(&bytes),
             PictureFormat::Npy => npy::read(&bytes),
+            #[cfg(feature = "hdr")]
+            PictureFormat::Hdr => raster::read(&bytes, image::ImageFormat::Hdr),
         };
-        Ok(decoded?.finish())
+        Ok(decoded?.finish(coding))
     };
     read().map_err(|problem| ReadPictureError {
         file: path.to_owned(),

@@ -92,6 +92,7 @@ pub fn read(bytes: &[u8]) -> Result<Decoded, PictureProblem> {
         channels,
         samples,
         premultiplied,
+        panorama: None,
         further_channels: Vec::new(),
         warnings: Vec::new(),
     })

@@ -51,6 +51,7 @@ pub fn read(bytes: &[u8]) -> Result<Decoded, PictureProblem> {
         channels,
         samples: Samples::F32(samples),
         premultiplied: true,
+        panorama: None,
         further_channels: Vec::new(),
         warnings: Vec::new(),
     })

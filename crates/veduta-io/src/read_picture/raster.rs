@@ -1,7 +1,8 @@
-//! PNG, JPEG and WebP.
+//! PNG, JPEG, WebP and Radiance.
 
 use super::decoded::{Channels, Decoded, Samples};
 use super::{PictureProblem, check_size};
+use crate::sphere::{Gpano, Panorama};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
@@ -19,6 +20,14 @@ pub fn read(bytes: &[u8], format: ImageFormat) -> Result<Decoded, PictureProblem
     if profile.is_some_and(|profile| !is_srgb(&profile)) {
         warnings.push("has a colour profile that is not applied; it is taken as sRGB".into());
     }
+    let mut panorama = None;
+    if let Some(packet) = decoder.xmp_metadata().map_err(problem)? {
+        // A picture is one whatever it says of itself.
+        match Gpano::read(&packet) {
+            Ok(found) => panorama = found.map(Panorama::Gpano),
+            Err(message) => warnings.push(message),
+        }
+    }
     if format == ImageFormat::Jpeg && !jpeg_ends(bytes) {
         let message = "it has no end; it was cut short";
         return Err(PictureProblem::Damaged(message.into()));
@@ -34,6 +43,7 @@ pub fn read(bytes: &[u8], format: ImageFormat) -> Result<Decoded, PictureProblem
         DynamicImage::ImageLumaA16(image) => (GreyOpacity, Samples::U16(image.into_raw())),
         DynamicImage::ImageRgb16(image) => (Color, Samples::U16(image.into_raw())),
         DynamicImage::ImageRgba16(image) => (ColorOpacity, Samples::U16(image.into_raw())),
+        DynamicImage::ImageRgb32F(image) => (Color, Samples::F32(image.into_raw())),
         other => {
             let message = format!("its samples are {:?}", other.color());
             return Err(PictureProblem::Unsupported(message));
@@ -45,6 +55,7 @@ pub fn read(bytes: &[u8], format: ImageFormat) -> Result<Decoded, PictureProblem
         channels,
         samples,
         premultiplied: false,
+        panorama,
         further_channels: Vec::new(),
         warnings,
     })

@@ -68,6 +68,7 @@ pub fn read(bytes: &[u8]) -> Result<Decoded, PictureProblem> {
         // Where the file does not say: floating point is premultiplied by habit, other is not.
         premultiplied: opacity.map_or(linear, |kind| kind == ASSOCIATED),
         samples,
+        panorama: None,
         further_channels: Vec::new(),
         warnings: Vec::new(),
     })

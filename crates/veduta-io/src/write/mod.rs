@@ -12,6 +12,8 @@
 mod coded;
 #[cfg(feature = "exr")]
 mod exr;
+#[cfg(feature = "hdr")]
+mod hdr;
 #[cfg(feature = "jpeg")]
 mod jpeg;
 mod model;
@@ -37,6 +39,7 @@ pub use vector::{
     MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
 };
 
+use crate::sphere::Panorama;
 use std::fmt;
 use std::io::{self, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -64,6 +67,10 @@ pub enum PictureFormat {
     Pfm,
     /// NumPy: an array of f32, height x width x 4.
     Npy,
+    /// Radiance, 8 bits a channel and an exponent for all three. It has no opacity: what is not covered is
+    /// black.
+    #[cfg(feature = "hdr")]
+    Hdr,
 }
 
 /// Suffixes of the files that [`write_picture`] writes and [`read_picture`](crate::read_picture)
@@ -85,6 +92,8 @@ pub const PICTURE_SUFFIXES: &[&str] = &[
     "exr",
     "pfm",
     "npy",
+    #[cfg(feature = "hdr")]
+    "hdr",
 ];
 
 impl PictureFormat {
@@ -103,6 +112,8 @@ impl PictureFormat {
             "exr" => Some(Self::Exr),
             "pfm" => Some(Self::Pfm),
             "npy" => Some(Self::Npy),
+            #[cfg(feature = "hdr")]
+            "hdr" => Some(Self::Hdr),
             _ => None,
         }
     }
@@ -147,6 +158,8 @@ impl PictureFormat {
             #[cfg(feature = "exr")]
             Self::Exr => &[Samples::F32, Samples::F16],
             Self::Pfm | Self::Npy => &[Samples::F32],
+            #[cfg(feature = "hdr")]
+            Self::Hdr => &[Samples::F32],
         }
     }
 }
@@ -199,6 +212,8 @@ pub struct PictureOptions {
     pub exr_compression: ExrCompression,
     /// Side of the tiles of an EXR in pixels, at least 1; `None` for scanlines.
     pub exr_tile: Option<u32>,
+    /// What part of which sphere the picture shows, which PNG, JPEG and EXR tell.
+    pub panorama: Option<Panorama>,
 }
 
 impl Default for PictureOptions {
@@ -209,6 +224,7 @@ impl Default for PictureOptions {
             jpeg_quality: 92,
             exr_compression: ExrCompression::Zip,
             exr_tile: None,
+            panorama: None,
         }
     }
 }
@@ -432,9 +448,9 @@ fn encode(
     let writer = &mut writer;
     match format {
         #[cfg(feature = "png")]
-        PictureFormat::Png => png::write(writer, picture, samples),
+        PictureFormat::Png => png::write(writer, picture, samples, options.panorama),
         #[cfg(feature = "jpeg")]
-        PictureFormat::Jpeg => jpeg::write(writer, picture, options.jpeg_quality),
+        PictureFormat::Jpeg => jpeg::write(writer, picture, options),
         #[cfg(feature = "tiff")]
         PictureFormat::Tiff => tiff::write(writer, picture, samples),
         #[cfg(feature = "webp")]
@@ -443,10 +459,12 @@ fn encode(
         PictureFormat::Exr => exr::write(writer, picture, None, samples, options),
         PictureFormat::Pfm => pfm::write(writer, picture),
         PictureFormat::Npy => npy::write(writer, picture),
+        #[cfg(feature = "hdr")]
+        PictureFormat::Hdr => hdr::write(writer, picture),
     }
 }
 
-#[cfg(any(feature = "jpeg", feature = "webp"))]
+#[cfg(any(feature = "jpeg", feature = "webp", feature = "hdr"))]
 fn image_problem(error: image::ImageError) -> WriteProblem {
     match error {
         image::ImageError::IoError(error) => WriteProblem::Io(error),

@@ -1,4 +1,5 @@
 use super::{Samples, WriteProblem, coded};
+use crate::sphere::Panorama;
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use std::io::Write;
 use veduta::accumulate::Picture;
@@ -6,11 +7,12 @@ use veduta::accumulate::Picture;
 /// Rows that are converted at a time, so that the converted picture need not fit in memory too.
 const BAND_ROWS: usize = 256;
 
-/// Writes RGBA in sRGB with straight opacity, and says so in an `sRGB` chunk.
+/// Writes RGBA in sRGB with straight opacity, and says so in an `sRGB` chunk; of a panorama in XMP.
 pub fn write(
     writer: &mut impl Write,
     picture: &Picture,
     samples: Samples,
+    panorama: Option<Panorama>,
 ) -> Result<(), WriteProblem> {
     let sixteen = samples == Samples::U16;
     let mut encoder = Encoder::new(writer, picture.width, picture.height);
@@ -21,6 +23,12 @@ pub fn write(
         BitDepth::Eight
     });
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    if let Some(Panorama::Gpano(told)) = panorama {
+        let keyword = "XML:com.adobe.xmp".to_owned();
+        encoder
+            .add_itxt_chunk(keyword, told.packet())
+            .map_err(problem)?;
+    }
     let mut writer = encoder.write_header().map_err(problem)?;
     let mut stream = writer.stream_writer().map_err(problem)?;
     for band in picture.pixels.chunks(picture.width as usize * BAND_ROWS) {
@@ -57,7 +65,7 @@ mod tests {
         };
         for samples in [Samples::U8, Samples::U16] {
             let mut bytes = Vec::new();
-            write(&mut bytes, &picture, samples).expect("memory takes all");
+            write(&mut bytes, &picture, samples, None).expect("memory takes all");
             let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
             let mut reader = decoder.read_info().expect("a PNG");
             assert!(

@@ -3,6 +3,7 @@
 mod damaged;
 mod layers;
 mod round_trips;
+mod sphere;
 mod vector;
 
 use std::path::PathBuf;

@@ -15,3 +15,4 @@ mod scene_file;
 mod scene_file_damaged;
 mod stl;
 mod support;
+mod views_file;

@@ -63,7 +63,7 @@ fn rich_folder() -> Folder {
 }
 
 /// What a key may be made to: of other kinds, out of range, nearly right.
-fn values() -> Vec<Value> {
+pub fn values() -> Vec<Value> {
     let mut values = vec![
         json!(0),
         json!(1),
@@ -130,7 +130,7 @@ fn values() -> Vec<Value> {
 }
 
 /// The document as TOML, each of its tables on a line. JSON has no word for NaN, so null is one.
-fn toml_of(document: &Value) -> String {
+pub fn toml_of(document: &Value) -> String {
     let mut text = String::new();
     for (key, value) in document.as_object().into_iter().flatten() {
         let _ = write!(text, "{} = ", quoted(key));
@@ -176,7 +176,7 @@ fn add_inline(value: &Value, text: &mut String) {
 }
 
 /// Whether the reader finds fault with the form of `file`, which a schema can tell as well.
-fn is_of_wrong_form(error: &ReadError, file: &str) -> bool {
+pub fn is_of_wrong_form(error: &ReadError, file: &str) -> bool {
     error.file.ends_with(file)
         && error.all().any(|error| {
             matches!(
@@ -338,7 +338,7 @@ fn check_one(loaded: Result<veduta_io::Loaded, ReadError>, case: &str) -> bool {
 }
 
 /// Drops, doubles or changes a letter of a key somewhere in the document.
-fn misspell(document: &mut Value, random: &mut Random) {
+pub fn misspell(document: &mut Value, random: &mut Random) {
     let mut place = document;
     loop {
         match place {

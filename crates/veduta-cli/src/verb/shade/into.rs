@@ -233,6 +233,7 @@ fn read_old(
         linear,
         further_channels,
         warnings,
+        panorama: _,
     } = read_picture(old)?;
     let file = old.display();
     let refuse = |message: String| Err(Failure::new(Code::Usage, format!("{file}: {message}")));

@@ -23,6 +23,9 @@ mod layer;
 mod material;
 mod source;
 mod value;
+mod views;
+
+pub use views::{FileView, read_views_file, views_file_schema};
 
 use super::error::{Place, Problem, ReadError, Warning, Warnings};
 use super::moment::USUAL_FRAMES_PER_SECOND;

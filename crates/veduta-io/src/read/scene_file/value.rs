@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 use toml::de::DeValue;
 use veduta::geometry::{DMat4, DVec2, DVec3, DVec4, Vec2};
+use veduta::reproject::Lens;
 use veduta::scene::Shown;
 
 /// A number. TOML also has infinities and what is no number at all; those are refused.
@@ -700,6 +701,58 @@ impl Leaf for CameraName {
         let mut schema = <Name as Leaf>::schema();
         schema["not"] = json!({ "const": "auto" });
         schema
+    }
+}
+
+/// A lens, by the name that `veduta dome` gives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LensName(pub Lens);
+
+impl Leaf for LensName {
+    const EXPECTED: &'static str =
+        "a lens such as \"perspective:60\", \"fisheye:180\" or \"equirect\"";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        Some(value.as_str()?.parse().map(Self).map_err(|_| OutOfRange))
+    }
+
+    fn schema() -> Value {
+        json!({ "type": "string", "minLength": 1 })
+    }
+}
+
+/// The centre and the radius of a circle, in pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct Circle(pub [f64; 3]);
+
+impl Leaf for Circle {
+    const EXPECTED: &'static str = "x and y of a centre and a radius in pixels, the radius at least 0.5, such as [960, 540, 520]";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        let circle: [f64; 3] = array(value, number)?;
+        let is_in_range = circle[2] >= 0.5 && circle.iter().all(|number| number.abs() <= 1e6);
+        ranged(Self(circle), is_in_range)
+    }
+
+    fn schema() -> Value {
+        array_schema(3, json!({ "type": "number" }))
+    }
+}
+
+/// Quarters of a turn, told in degrees.
+#[derive(Clone, Copy, Debug)]
+pub struct Quarters(pub u8);
+
+impl Leaf for Quarters {
+    const EXPECTED: &'static str = "0, 90, 180 or 270 degrees";
+
+    fn parse(value: &DeValue<'_>) -> Option<Result<Self, OutOfRange>> {
+        let degrees = whole(value, 0.0..=270.0)?;
+        (degrees % 90.0 == 0.0).then_some(Ok(Self((degrees / 90.0) as u8)))
+    }
+
+    fn schema() -> Value {
+        json!({ "enum": [0, 90, 180, 270] })
     }
 }
 

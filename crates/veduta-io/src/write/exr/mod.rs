@@ -8,6 +8,7 @@ pub use layers::Layers;
 
 use super::{ExrCompression, PictureOptions, Samples, WriteProblem};
 use crate::deep_exr::{DeepCompression, pack};
+use crate::sphere::Panorama;
 use exr::block::chunk::{
     Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock, TileCoordinates,
 };
@@ -16,7 +17,7 @@ use exr::block::{BlockIndex, UncompressedBlock, enumerate_ordered_header_block_i
 use exr::math::RoundingMode;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::{
-    ChannelDescription, LevelMode, LineOrder, SampleType, Text, TileDescription,
+    ChannelDescription, EnvironmentMap, LevelMode, LineOrder, SampleType, Text, TileDescription,
 };
 use exr::meta::header::{Header, LayerAttributes};
 use exr::prelude::{Compression, Vec2, f16};
@@ -25,6 +26,7 @@ use header::RecordHead;
 use rayon::prelude::*;
 use std::io::{Seek, Write};
 use veduta::accumulate::Picture;
+use veduta::reproject::Orientation;
 
 /// Blocks that are packed side by side before they are written.
 const BLOCKS_AT_ONCE: usize = 64;
@@ -89,6 +91,14 @@ pub fn write(
         software_name: Some(Text::from("veduta")),
         ..LayerAttributes::default()
     };
+    match options.panorama {
+        Some(Panorama::ExrLatLong { orientation }) => {
+            attributes.environment_map = Some(EnvironmentMap::LatitudeLongitude);
+            attributes.world_to_camera = Some(world_to_camera(&orientation));
+        }
+        Some(Panorama::ExrCube) => attributes.environment_map = Some(EnvironmentMap::Cube),
+        _ => {}
+    }
     if let Some(layers) = layers {
         layers.check(picture)?;
         layers.add_channels(samples, &mut channels);
@@ -123,6 +133,16 @@ pub fn write(
         other => WriteProblem::Encode(other.to_string()),
     })?;
     Ok(recorder.put_in_order()?)
+}
+
+/// For vectors that stand to the left of the matrix; in both spaces x is right, y up and z forward.
+fn world_to_camera(orientation: &Orientation) -> [f32; 16] {
+    // The inverse of a rotation is its transpose, and row vectors transpose once more.
+    let axes = [orientation.right(), orientation.up(), orientation.forward()];
+    let [right, up, forward] = axes.map(|axis| [axis.x, axis.y, -axis.z].map(|v| v as f32));
+    let row = |k: usize| [right[k], up[k], forward[k], 0.0];
+    let rows = [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]];
+    std::array::from_fn(|k| rows[k / 4][k % 4])
 }
 
 fn header(size: Vec2<usize>, channels: &[Channel], options: &PictureOptions) -> Header {

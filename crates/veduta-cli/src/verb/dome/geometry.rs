@@ -1,0 +1,131 @@
+//! What is seen where, for all pictures of one eye, and the filter that makes them.
+
+use clap::{Args, ValueEnum};
+use veduta::accumulate::Picture;
+use veduta::filter::ewa::{Ewa, Profile};
+use veduta::reproject::{Projection, Reprojection, Views};
+
+/// How the texels of the views become pixels.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Filter")]
+pub struct Filtering {
+    /// How texels are weighed within the footprint of a pixel
+    #[arg(long, value_name = "NAME", default_value = "auto")]
+    kernel: Kernel,
+    /// How exact footprints of many texels are: two levels of a pyramid stand in for them, the finer the more
+    /// exact; full weighs every texel
+    #[arg(long, value_name = "HOW", default_value = "good")]
+    precision: Precision,
+}
+
+/// `--kernel`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Kernel {
+    /// Sharp where views are magnified, gaussian where they are reduced
+    Auto,
+    /// That of Greene & Heckbert: soft, and nothing gets darker or brighter than the views are
+    Gaussian,
+    /// As sharp as pixels of exact area
+    Sharp,
+    /// ImageMagick's
+    Robidoux,
+    /// Mitchell & Netravali's
+    Mitchell,
+}
+
+/// `--precision`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Precision {
+    /// For a first look
+    Draft,
+    /// For pictures
+    Good,
+    /// For masters
+    Master,
+    /// Every texel
+    Full,
+}
+
+impl Filtering {
+    fn ewa(&self) -> Ewa {
+        Ewa {
+            profile: match self.kernel {
+                Kernel::Auto => Profile::Auto,
+                Kernel::Gaussian => Profile::Gaussian,
+                Kernel::Sharp => Profile::Sharp,
+                Kernel::Robidoux => Profile::Robidoux,
+                Kernel::Mitchell => Profile::Mitchell,
+            },
+            pyramid: match self.precision {
+                Precision::Draft => Some(2.0),
+                Precision::Good => Some(3.0),
+                Precision::Master => Some(4.0),
+                Precision::Full => None,
+            },
+            ..Ewa::default()
+        }
+    }
+}
+
+/// What is seen where in the pictures of one eye: for all frames of a sequence.
+pub struct Geometry {
+    parts: Vec<Part>,
+}
+
+/// One picture.
+struct Part {
+    reprojection: Reprojection,
+    /// The room for the views' pictures, from frame to frame.
+    views: Option<Views>,
+}
+
+impl Geometry {
+    /// Works out where the pixels of `targets` lie in `views`.
+    pub fn new(views: &[Projection], targets: &[Projection], filtering: &Filtering) -> Self {
+        let ewa = filtering.ewa();
+        let part = |target: &Projection| Part {
+            reprojection: Reprojection::new(views, target, &ewa),
+            views: None,
+        };
+        Self {
+            parts: targets.iter().map(part).collect(),
+        }
+    }
+
+    /// What no view shows: names of sides of a cube, and their shares of all pictures.
+    pub fn missing(&self) -> Vec<(&'static str, f64)> {
+        let mut sums: Vec<(&'static str, f64)> = Vec::new();
+        for part in &self.parts {
+            for (name, share) in part.reprojection.missing().toward {
+                let share = share / self.parts.len() as f64;
+                match sums.iter_mut().find(|(known, _)| *known == name) {
+                    Some((_, sum)) => *sum += share,
+                    None => sums.push((name, share)),
+                }
+            }
+        }
+        sums.sort_by(|a, b| b.1.total_cmp(&a.1));
+        sums
+    }
+
+    /// Makes the pictures of a frame from those of its views.
+    pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
+        let is_opaque = |picture: &Picture| picture.pixels.iter().all(|pixel| pixel[3] == 1.0);
+        let opaque = views.iter().all(is_opaque);
+        let is_alone = self.parts.len() == 1;
+        let make = |part: &mut Part| {
+            let channels = if opaque { 3 } else { 4 };
+            let kept = part.views.take().filter(|kept| kept.channels() == channels);
+            let mut planes = kept.unwrap_or_else(|| part.reprojection.views(opaque));
+            for (view, picture) in views.iter().enumerate() {
+                planes.set(view, picture);
+            }
+            planes.complete();
+            let picture = part.reprojection.picture(&planes);
+            // The room of six sides at once would be too much.
+            part.views = is_alone.then_some(planes);
+            picture
+        };
+        self.parts.iter_mut().map(make).collect()
+    }
+}

@@ -1,0 +1,535 @@
+//! `veduta dome`: views of all around -> domes, panoramas, mirror balls and cubes.
+//!
+//! 1. `source`: the files, and what they show ([`View`]s); 2. `target`: what is made of them, and its files;
+//! 3. `doubts`: what may be wrong with the views, and what is missing; 4. each frame is read, filtered by
+//!    [`veduta::reproject`], finished (mask, guides, background) and written.
+//!
+//! What is seen where is worked out once for all frames of a sequence.
+
+mod doubts;
+mod geometry;
+mod source;
+mod target;
+
+use super::frame_names::FrameNames;
+use super::output::{Output, Target};
+use crate::exit::{Code, Failure};
+use crate::talk::{Talk, counted, plain, print};
+use crate::values::{Background, FrameRange, Size};
+use clap::{Args, ValueEnum};
+use geometry::{Filtering, Geometry};
+use serde_json::{Value, json};
+use source::{Files, Frame, Source, warn};
+use std::path::{Path, PathBuf};
+use target::{Aim, EYE, Made};
+use veduta::accumulate::Picture;
+use veduta_io::sphere::{Guide, Side, View, draw_guides, mask, test_card};
+use veduta_io::{FileView, PictureFormat, tone};
+
+/// Make a dome, a panorama, a mirror ball or a cube of pictures of all that is around
+///
+/// The views are the sides of a cube, in files or in one picture, a panorama, a fisheye, or any pictures whose
+/// lenses a file of views (.toml; veduta schema views) tells. Each pixel is the weighted mean of all texels
+/// in its footprint (EWA, after Greene & Heckbert), so that nothing flickers and no seams show.
+///
+/// Where the views show nothing, the picture is clear. Light is averaged as light: numbers of 8 and 16 bits
+/// are taken as sRGB. Sequences have # for the digits of their numbers, in views and -o.
+#[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES)]
+pub struct Dome {
+    /// The views: pictures, or a file of views
+    #[arg(value_name = "VIEWS", required_unless_present_any = ["test_card", "guides"])]
+    views: Vec<PathBuf>,
+    /// The same for the right eye; those before are for the left
+    #[arg(long, value_name = "VIEWS", num_args = 1.., requires = "views")]
+    right: Vec<PathBuf>,
+    /// Which frames of a sequence: FIRST..LAST, both included, FIRST..LASTxSTEP, or one number; all that are
+    /// there by default
+    #[arg(long, value_name = "A..B")]
+    frames: Option<FrameRange>,
+    /// The number of the first frame that is written; that of its views by default
+    #[arg(long, value_name = "N")]
+    start: Option<u32>,
+    /// Keep a circle of that angle, and let it end softly within the second: 180deg,4deg
+    #[arg(long, value_name = "FOV[,SOFT]", value_parser = target::mask)]
+    mask: Option<[f64; 2]>,
+    /// Lay lines over a dome: alignment (altitudes, azimuths and names), safe-area (what all seats see well)
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    guides: Vec<GuideArgument>,
+    /// What lies behind: a colour or none; black by default for .jpg
+    #[arg(long, value_name = "COLOUR", value_parser = background)]
+    background: Option<Behind>,
+    /// Make every warning an error
+    #[arg(long)]
+    strict: bool,
+
+    #[command(flatten)]
+    aim: Aim,
+    #[command(flatten)]
+    source: Source,
+    #[command(flatten)]
+    filtering: Filtering,
+    #[command(flatten)]
+    output: Output,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  What is where? A cube whose sides tell it, as a domemaster and as a strip:
+      veduta dome --test-card -o card.png
+      veduta dome --test-card 512 --lens cube --to-layout 3x2 -o strip.png
+  A domemaster of the sides of a cube that are in one picture or in six files:
+      veduta dome strip.png -o dome.png --size 1024
+      veduta dome strip.png --lens cube -o 'sky_{side}.png'
+      veduta dome sky_*.png -o dome.png --size 1024
+  The frame of an Omnimax film, and a panorama that photo viewers know:
+      veduta dome sky_*.png --lens omnimax -o frame.png --size 983
+      veduta dome sky_*.png --lens equirect -o pano.jpg
+  Of that again a theatre's picture, its dome tilted by 20 degrees:
+      veduta dome pano.jpg --tilt 20deg --mask 180deg,2deg -o show.png
+  Lines to align projectors by:
+      veduta dome --guides alignment,safe-area --size 1024 -o align.png
+";
+
+/// `--guides`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum GuideArgument {
+    /// Circles of altitude, lines of azimuth, and their names
+    Alignment,
+    /// 50 degrees to both sides of the front, from 10 to 60 degrees of altitude
+    SafeArea,
+}
+
+/// `--background`: a linear colour, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Behind(Option<[f32; 3]>);
+
+fn background(text: &str) -> Result<Behind, String> {
+    match text.parse() {
+        Ok(Background::None) => Ok(Behind(None)),
+        Ok(Background::Color(color)) => Ok(Behind(Some(color))),
+        _ => Err("expected none, or a colour such as '#000' (in quotes)".into()),
+    }
+}
+
+/// What is the same for all frames.
+struct Run<'a> {
+    /// Of the left eye, or of the only one, and of the right.
+    eyes: Vec<Eye<'a>>,
+    names: FrameNames<'a>,
+    format: PictureFormat,
+    /// Whether the whole may go on where a frame cannot be read.
+    is_sequence: bool,
+}
+
+/// One eye's files, and, once the first frame is read, what they show.
+struct Eye<'a> {
+    name: &'static str,
+    files: Option<Files<'a>>,
+    seen: Option<Seen>,
+}
+
+/// What pictures of these sizes show.
+struct Seen {
+    sizes: Vec<[u32; 2]>,
+    views: Vec<View>,
+    made: Made,
+    geometry: Geometry,
+    missing: Vec<(String, f64)>,
+}
+
+impl Dome {
+    pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        let output = self.output.file()?.to_owned();
+        let format = self.check(&output)?;
+        self.source.check()?;
+        let rigs = [&self.views, &self.right].map(|views| self.source.rig(views));
+        let [left_rig, right_rig] = rigs;
+        let (left_rig, right_rig) = (left_rig?, right_rig?);
+        let mut run = self.prepare(&output, format, left_rig.as_deref(), right_rig.as_deref())?;
+        let numbers = self.numbers(&run)?;
+        let mut rows = Vec::new();
+        let mut failed: Vec<(u32, String)> = Vec::new();
+        talk.begin(if run.is_sequence { "frames" } else { "making" });
+        for (done, &number) in numbers.iter().enumerate() {
+            if run.is_sequence {
+                talk.part(done, numbers.len());
+            }
+            let written = self
+                .start
+                .map_or(number, |start| start.saturating_add(done as u32));
+            match self.frame(&mut run, number, written, talk) {
+                Ok(row) => rows.push(row),
+                Err(failure) if run.is_sequence && is_of_a_frame(failure.code) => {
+                    talk.warn(format!("frame {number}: {failure}"));
+                    failed.push((number, failure.to_string()));
+                }
+                Err(failure) => return Err(failure),
+            }
+        }
+        talk.end();
+        if json {
+            print(&format!("{}\n", self.told(&run, &rows, &failed, talk)?))?;
+        }
+        if failed.is_empty() {
+            return Ok(());
+        }
+        let list: Vec<_> = failed
+            .iter()
+            .map(|(number, _)| number.to_string())
+            .collect();
+        let message = format!(
+            "{} of {} could not be made: {}",
+            failed.len(),
+            counted(numbers.len(), "frame"),
+            list.join(", ")
+        );
+        Err(Failure::new(Code::Missing, message))
+    }
+
+    /// Refuses what makes no sense together; the format of the pictures.
+    fn check(&self, output: &Path) -> Result<PictureFormat, Failure> {
+        let usage = |message: &str| Err(Failure::new(Code::Usage, message.to_owned()));
+        if self.output.preview.is_some() {
+            return usage("a dome is written by -o FILE; --preview is for veduta render");
+        }
+        if self.output.has_layers() {
+            return usage("pictures of others have no further channels: --aov is not for domes");
+        }
+        let target = self.target(output)?;
+        let format = target.format();
+        self.aim.check(output, format)?;
+        let round = self.aim.lens()?.is_round() && !self.aim.is_cube();
+        if !self.guides.is_empty() && !round {
+            return usage("--guides are for round lenses, such as --lens domemaster");
+        }
+        if self.mask.is_some() && !round {
+            return usage("--mask is for round lenses, such as --lens domemaster");
+        }
+        let names_eyes = output.to_string_lossy().contains(EYE);
+        let is_joined = self.aim.stereo().is_some();
+        match (self.right.is_empty(), names_eyes, is_joined) {
+            (true, true, _) => usage(
+                "{eye} in a name is for two eyes; name the views of the right one with --right",
+            ),
+            (false, true, true) => {
+                usage("--stereo makes one picture of both eyes; take {eye} out of its name")
+            }
+            (false, false, false) => usage(
+                "pictures for two eyes are two files: put {eye} into the name, such as -o 'show_{eye}.png', or \
+                 one with --stereo",
+            ),
+            (false, false, true) if self.aim.is_cube() => {
+                usage("--stereo joins two pictures, not two cubes")
+            }
+            _ => Ok(format),
+        }
+    }
+
+    fn prepare<'a>(
+        &'a self,
+        output: &'a Path,
+        format: PictureFormat,
+        left: Option<&'a [FileView]>,
+        right: Option<&'a [FileView]>,
+    ) -> Result<Run<'a>, Failure> {
+        let eye = |name, views: &'a [PathBuf], rig| Eye {
+            name,
+            files: (!views.is_empty()).then(|| self.source.files(views, rig)),
+            seen: None,
+        };
+        let mut eyes = vec![eye("left", &self.views, left)];
+        if !self.right.is_empty() {
+            eyes.push(eye("right", &self.right, right));
+        }
+        let are_numbered = eyes
+            .iter()
+            .filter_map(|eye| eye.files.as_ref())
+            .any(Files::are_numbered);
+        if !are_numbered && self.frames.is_some() {
+            let message = "--frames is for sequences: views with # for the digits of their numbers, such as \
+                front.####.png";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        let several = are_numbered && self.frames.is_none_or(|frames| !frames.is_one());
+        if output.as_os_str() == "-" && (several || self.aim.is_cube() && output.as_os_str() == "-")
+        {
+            let message = "several pictures are files; name them with -o";
+            return Err(Failure::new(Code::Usage, message));
+        }
+        // One picture may go to stdout.
+        let names = match output.as_os_str() == "-" {
+            true => FrameNames::of_input(output),
+            false => FrameNames::of(output, several)?,
+        };
+        Ok(Run {
+            eyes,
+            names,
+            format,
+            is_sequence: are_numbered,
+        })
+    }
+
+    /// The numbers of the frames to make.
+    fn numbers(&self, run: &Run<'_>) -> Result<Vec<u32>, Failure> {
+        if !run.is_sequence {
+            return Ok(vec![0]);
+        }
+        if let Some(frames) = self.frames {
+            return Ok(frames.numbers().collect());
+        }
+        let mut numbers = std::collections::BTreeSet::new();
+        for files in run.eyes.iter().filter_map(|eye| eye.files.as_ref()) {
+            numbers.extend(files.numbers_there()?);
+        }
+        if numbers.is_empty() {
+            let first = run.eyes[0]
+                .files
+                .as_ref()
+                .map_or(Path::new(""), Files::first);
+            let pattern = plain(&first.to_string_lossy());
+            let message = format!("{pattern}: no file has a name like that, with digits for #");
+            return Err(Failure::new(Code::Missing, message));
+        }
+        Ok(numbers.into_iter().collect())
+    }
+
+    /// The place of a picture.
+    fn target(&self, path: &Path) -> Result<Target, Failure> {
+        let input = self
+            .views
+            .first()
+            .map_or(Path::new("dome.png"), PathBuf::as_path);
+        let target = self.output.at(path).target(input, false)?;
+        target.ok_or_else(|| Failure::new(Code::Usage, "a dome is written by -o FILE"))
+    }
+
+    /// Makes the pictures of a frame; what to tell of it.
+    fn frame(
+        &self,
+        run: &mut Run<'_>,
+        number: u32,
+        written: u32,
+        talk: &mut Talk,
+    ) -> Result<Value, Failure> {
+        let Run {
+            eyes,
+            names,
+            format,
+            ..
+        } = run;
+        let mut made = Vec::new();
+        for eye in eyes.iter_mut() {
+            made.push(self.eye(eye, *format, number, talk)?);
+        }
+        let mut paths = Vec::new();
+        let stereo = self.aim.stereo();
+        if let (Some(how), [_, _]) = (stereo, made.as_slice()) {
+            let [right, left] = [made.pop(), made.pop()].map(Option::unwrap_or_default);
+            let joined = left.into_iter().zip(right);
+            let joined = joined.map(|((side, left), (_, right))| {
+                if [left.width, left.height] != [right.width, right.height] {
+                    let message = "the views of both eyes have different sizes, and so have their pictures; \
+                        tell --size";
+                    return Err(Failure::new(Code::BadInput, message));
+                }
+                Ok((side, target::both(left, &right, how)))
+            });
+            made.push(joined.collect::<Result<_, _>>()?);
+        }
+        for (eye, pictures) in eyes.iter().zip(made) {
+            let seen = eye.seen.as_ref().expect("a frame was made of it");
+            // Two eyes in one picture are what no tag tells.
+            let panorama = seen.made.panorama.filter(|_| stereo.is_none());
+            for (side, picture) in pictures {
+                let path = target::file(names, written, eye.name, side);
+                let target = self.target(&path)?.of_panorama(panorama);
+                let (width, height) = (picture.width, picture.height);
+                target.refuse_size(Size { width, height })?;
+                target.write(&picture, None)?;
+                paths.push(target.name());
+            }
+        }
+        Ok(json!({ "frame": number, "output": paths }))
+    }
+
+    /// The pictures of one eye: one, or one for each side.
+    fn eye(
+        &self,
+        eye: &mut Eye<'_>,
+        format: PictureFormat,
+        number: u32,
+        talk: &mut Talk,
+    ) -> Result<Vec<(Option<Side>, Picture)>, Failure> {
+        let frame = match &eye.files {
+            Some(files) => Some(self.source.read(files, number, self.strict, talk)?),
+            None => None,
+        };
+        let sizes = frame.as_ref().map_or(Vec::new(), Frame::sizes);
+        if eye.seen.is_none() {
+            let views = match (&eye.files, &frame) {
+                (Some(files), Some(frame)) => self.source.views(files, frame)?,
+                _ => self.card_views()?,
+            };
+            eye.seen = Some(self.look(sizes.clone(), views, frame.as_ref(), format, talk)?);
+        }
+        let seen = eye.seen.as_mut().expect("was just worked out");
+        if let Some(k) = (0..sizes.len()).find(|&k| sizes[k] != seen.sizes[k]) {
+            let ([w, h], [first_w, first_h]) = (sizes[k], seen.sizes[k]);
+            let name = frame.as_ref().map_or(String::new(), |frame| frame.name(k));
+            let message = format!(
+                "{name}: has {w} x {h} pixels, and {first_w} x {first_h} in the first frame"
+            );
+            return Err(Failure::new(Code::BadInput, message));
+        }
+        let pictures: Vec<Picture> = match &frame {
+            Some(frame) => seen.views.iter().map(|view| frame.picture(view)).collect(),
+            None => {
+                let card =
+                    |view: &View| test_card(view.side.expect("is a side"), view.projection.width);
+                seen.views.iter().map(card).collect()
+            }
+        };
+        let made = seen.geometry.pictures(&pictures);
+        let mut made: Vec<(Option<Side>, Picture)> = seen
+            .made
+            .pictures
+            .iter()
+            .map(|(side, _)| *side)
+            .zip(made)
+            .collect();
+        for ((_, projection), (_, picture)) in seen.made.pictures.iter().zip(&mut made) {
+            self.finish(picture, projection, format);
+        }
+        if let Some(layout) = &seen.made.layout {
+            let size = made[0].1.width;
+            let joined = layout.join(size, |side| {
+                let found = made.iter().find(|(of, _)| *of == Some(side));
+                found.expect("all sides are made").1.clone()
+            });
+            return Ok(vec![(None, joined)]);
+        }
+        Ok(made)
+    }
+
+    /// The views of the test card; none where only guides are drawn.
+    fn card_views(&self) -> Result<Vec<View>, Failure> {
+        let Some(size) = self.source.test_card else {
+            return Ok(Vec::new());
+        };
+        let files = Side::ALL.map(|side| (side, veduta_io::sphere::Turn::NONE, [size; 2]));
+        let views = veduta_io::sphere::sides_in_files(&files, &Default::default());
+        views.map_err(|(_, error)| Failure::new(Code::Usage, error.to_string()))
+    }
+
+    /// Works out what is seen where, and tells what seems wrong.
+    fn look(
+        &self,
+        sizes: Vec<[u32; 2]>,
+        views: Vec<View>,
+        frame: Option<&Frame>,
+        format: PictureFormat,
+        talk: &mut Talk,
+    ) -> Result<Seen, Failure> {
+        let finest = match views.is_empty() {
+            // As fine as a picture of guides alone needs to be.
+            true => 180_f64.to_radians() / 2048.0,
+            false => veduta_io::sphere::finest_pixel(&views),
+        };
+        let made = self.aim.made(finest, format)?;
+        if let Some(frame) = frame {
+            for doubt in doubts::of(&views, frame) {
+                warn(doubt, self.strict, talk)?;
+            }
+        }
+        let targets: Vec<_> = made
+            .pictures
+            .iter()
+            .map(|(_, projection)| *projection)
+            .collect();
+        let projections: Vec<_> = views.iter().map(|view| view.projection).collect();
+        let geometry = Geometry::new(&projections, &targets, &self.filtering);
+        let missing = match views.is_empty() {
+            true => Vec::new(),
+            false => doubts::missing(&views, geometry.missing()),
+        };
+        for (what, share) in &missing {
+            let share = 100.0 * share;
+            let message = format!(
+                "no view shows {what}, which is {share:.1} % of the picture and stays clear"
+            );
+            warn(message, self.strict, talk)?;
+        }
+        Ok(Seen {
+            sizes,
+            views,
+            made,
+            geometry,
+            missing,
+        })
+    }
+
+    /// Mask, guides and background.
+    fn finish(
+        &self,
+        picture: &mut Picture,
+        projection: &veduta::reproject::Projection,
+        format: PictureFormat,
+    ) {
+        if let Some([fov, soft]) = self.mask {
+            mask(picture, projection, fov, soft);
+        }
+        let guides = self.guides.iter().map(|guide| match guide {
+            GuideArgument::Alignment => Guide::Alignment,
+            GuideArgument::SafeArea => Guide::SafeArea,
+        });
+        let guides: Vec<Guide> = guides.collect();
+        if !guides.is_empty() {
+            draw_guides(picture, projection, &guides);
+        }
+        // What is around a dome is dark, also where a format cannot leave it open.
+        let black = (format == PictureFormat::Jpeg).then_some([0.0; 3]);
+        if let Some(color) = self.background.map_or(black, |behind| behind.0) {
+            tone::lay_on(picture, color);
+        }
+    }
+
+    fn told(
+        &self,
+        run: &Run<'_>,
+        rows: &[Value],
+        failed: &[(u32, String)],
+        talk: &Talk,
+    ) -> Result<Value, Failure> {
+        let mut told = json!({
+            "output": run.names.pattern.to_string_lossy(),
+            "lens": self.aim.name()?,
+            "frames": rows,
+            "failed": failed.iter().map(|(frame, error)| json!({ "frame": frame, "error": error })).collect::<Vec<_>>(),
+            "warnings": talk.warnings(),
+        });
+        if let Some(seen) = run.eyes.first().and_then(|eye| eye.seen.as_ref()) {
+            let (_, projection) = seen.made.pictures[0];
+            told["size"] = json!([projection.width, projection.height]);
+            let view = |view: &View| {
+                json!({
+                    "name": view.name,
+                    "lens": view.projection.lens.to_string(),
+                    "size": [view.projection.width, view.projection.height],
+                })
+            };
+            told["views"] = seen.views.iter().map(view).collect();
+            let missing = |(what, share): &(String, f64)| json!({ "what": what, "share": share });
+            told["missing"] = seen.missing.iter().map(missing).collect();
+        }
+        Ok(told)
+    }
+}
+
+/// Whether others than the frame that failed so may be made all the same.
+fn is_of_a_frame(code: Code) -> bool {
+    matches!(
+        code,
+        Code::BadInput | Code::InputOutput | Code::Missing | Code::Unsupported
+    )
+}

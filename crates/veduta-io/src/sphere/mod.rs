@@ -1,0 +1,51 @@
+//! Pictures of the sphere around a viewer, as people and programs store them.
+//!
+//! - `side`: the sides of a cube, and the ways in which a square picture can lie; `file_names`: which side a
+//!   file shows; `layout`: where sides lie in one picture.
+//! - `views`: pictures of files -> views, each with what it sees where; `borders`: whether sides fit together.
+//! - `test_card`, `guides` (both of `letters`): pictures to try conventions and projectors on.
+//! - `gpano`: what photographs tell of themselves as panoramas, and [`Panorama`], what any file tells.
+
+mod borders;
+mod file_names;
+#[cfg(feature = "xmp")]
+mod gpano;
+mod guides;
+mod layout;
+mod letters;
+mod side;
+mod test_card;
+mod views;
+
+pub use borders::{Change, Fit, fit};
+pub use file_names::{NamesError, sides_by_names};
+#[cfg(feature = "xmp")]
+pub use gpano::{Gpano, Pose};
+pub use guides::{Guide, draw_guides, mask};
+pub use layout::{Cell, Layout, LayoutError, ShapeError, Spacing, USUAL_ORDER, sides_of, turns_of};
+pub use side::{Side, Turn};
+pub use test_card::test_card;
+pub use views::{
+    SideForm, View, ViewsError, finest_pixel, one_lens, orientation_of, side_projection,
+    sides_in_files, sides_in_layout, two_discs,
+};
+
+use veduta::reproject::Orientation;
+
+/// What a file tells of its picture as one of a sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Panorama {
+    /// PNG and JPEG: an equirectangular picture, or a part of one.
+    #[cfg(feature = "xmp")]
+    Gpano(Gpano),
+    /// OpenEXR: `envmap` by latitude and longitude. The front is along +z and in the middle, +x to the left
+    /// of it; the centres of the outermost pixels lie on the poles and on the line behind the viewer, which
+    /// both the first and the last column show.
+    ExrLatLong {
+        /// How the camera stands, for `worldToCamera`; not read.
+        orientation: Orientation,
+    },
+    /// OpenEXR: `envmap` of six sides, in the layout `exr`.
+    ExrCube,
+}
