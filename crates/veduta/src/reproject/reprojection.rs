@@ -257,17 +257,3 @@ impl Found {
         self.minor = self.minor.max(other.minor);
     }
 }
-impl Reprojection {
-    /// DEBUG
-    pub fn describe(&self) -> String {
-        let t: usize = self.bands.iter().map(|b| b.tiles.len()).sum();
-        let s: usize = self.bands.iter().map(|b| b.singles.len()).sum();
-        format!(
-            "tiles {t} singles {s} apron {} levels {} reach {} minor {}",
-            self.apron(),
-            self.levels(),
-            self.found.reach,
-            self.found.minor
-        )
-    }
-}

@@ -58,25 +58,29 @@ fn of_tile<V: Vector, const C: usize>(
         let start = ((tile.corner[1] + row) * width + tile.corner[0]) as usize;
         let pixels = &mut pixels[start..start + columns as usize];
         // In x alone: values, and derivatives by y.
-        let [[u, uy], [v, vy]] = tile.texel.map(|c| {
-            let value = |i: usize| y.mul_add(y.mul_add(c[6 + i], c[3 + i]), c[i]);
-            let slope = |i: usize| (2.0 * y).mul_add(c[6 + i], c[3 + i]);
-            [[0, 1, 2].map(value), [0, 1, 2].map(slope)]
-        });
+        let (mut value, mut slope) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
+        for (k, c) in tile.texel.iter().enumerate() {
+            for i in 0..3 {
+                value[k][i] = y.mul_add(y.mul_add(c[6 + i], c[3 + i]), c[i]);
+                slope[k][i] = (2.0 * y).mul_add(c[6 + i], c[3 + i]);
+            }
+        }
+        let [u, v] = value;
         for (chunk, pixels) in pixels.chunks_mut(LANES).enumerate() {
             let x = V::count(token) + V::all(token, (chunk * LANES) as f32 - middle[0]);
-            let along = |c: &[f32; 3]| x.polynomial(token, &[c[1], 2.0 * c[2]]);
             let centre = [x.polynomial(token, &u), x.polynomial(token, &v)];
             let steps = [
-                along(&u),
-                along(&v),
-                x.polynomial(token, &uy),
-                x.polynomial(token, &vy),
+                x.polynomial(token, &[u[1], 2.0 * u[2]]),
+                x.polynomial(token, &[v[1], 2.0 * v[2]]),
+                x.polynomial(token, &slope[0]),
+                x.polynomial(token, &slope[1]),
             ];
             let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps);
-            let arrays = steps.map(V::array);
+            let [ux, vx, uy, vy] = steps;
+            let arrays = [ux.array(), vx.array(), uy.array(), vy.array()];
             for (lane, pixel) in pixels.iter_mut().enumerate() {
-                let derivatives = arrays.map(|step| step[lane]);
+                let [ux, vx, uy, vy] = &arrays;
+                let derivatives = [ux[lane], vx[lane], uy[lane], vy[lane]];
                 let mean =
                     ewa.of_lane::<V, C>(token, levels, tile.base, &footprints, derivatives, lane);
                 *pixel = with_opacity(mean);
@@ -122,5 +126,7 @@ fn of_singles<V: Vector, const C: usize>(
 /// RGBA of what has three channels, and is opaque, or four.
 #[inline(always)]
 fn with_opacity<const C: usize>(mean: [f32; C]) -> [f32; 4] {
-    std::array::from_fn(|k| if k < C { mean[k] } else { 1.0 })
+    let mut pixel = [1.0; 4];
+    pixel[..C].copy_from_slice(&mean);
+    pixel
 }

@@ -67,17 +67,19 @@ impl Footprints {
         let t22 = turn.mul_add(s22 - minor, n2);
         let squared = zero.below(sharp, all(4.0), one);
         let scale = one.over(n1 * n2 * squared);
-        let reach = [(t11 * squared).sqrt(), (t22 * squared).sqrt()];
-        let first = [0, 1].map(|k| (centre[k] - reach[k]).floor() + one);
-        let count = [0, 1].map(|k| (centre[k] + reach[k]).ceil() - first[k]);
-        let equation = [t22 * scale, t12 * scale * all(-2.0), t11 * scale];
+        // No closures from here on: what the compiler does not inline has no vector instructions.
+        let [u, v] = centre;
+        let (du, dv) = ((t11 * squared).sqrt(), (t22 * squared).sqrt());
+        let (first_u, first_v) = ((u - du).floor() + one, (v - dv).floor() + one);
+        let (count_u, count_v) = ((u + du).ceil() - first_u, (v + dv).ceil() - first_v);
+        let (a, b, c) = (t22 * scale, t12 * scale * all(-2.0), t11 * scale);
         Self {
-            centre: centre.map(V::array),
-            equation: equation.map(V::array),
-            first: first.map(whole),
-            count: count.map(whole),
+            centre: [u.array(), v.array()],
+            equation: [a.array(), b.array(), c.array()],
+            first: [whole(first_u), whole(first_v)],
+            count: [whole(count_u), whole(count_v)],
             sharp: sharp.array(),
-            reach: reach[0].max(reach[1]).array(),
+            reach: du.max(dv).array(),
             minor: minor.array(),
         }
     }
@@ -86,5 +88,11 @@ impl Footprints {
 /// Lanes of whole numbers as such.
 #[inline(always)]
 fn whole<V: Vector>(lanes: V) -> [i32; LANES] {
-    lanes.array().map(|x| x as i32)
+    let lanes = lanes.array();
+    let mut whole = [0; LANES];
+    for (whole, x) in whole.iter_mut().zip(lanes) {
+        // No case for numbers beyond all texels: they are not read.
+        *whole = x as i32;
+    }
+    whole
 }

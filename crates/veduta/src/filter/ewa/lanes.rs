@@ -338,7 +338,8 @@ mod avx2 {
             let avx = a.token.avx;
             let pairs = |a: Self, b: Self| avx._mm256_hadd_ps(cast(a.lanes), cast(b.lanes));
             let quarters: [f32; LANES] = cast(avx._mm256_hadd_ps(pairs(a, b), pairs(c, d)));
-            std::array::from_fn(|k| quarters[k] + quarters[k + 4])
+            let [a, b, c, d, e, f, g, h] = quarters;
+            [a + e, b + f, c + g, d + h]
         }
     }
 }

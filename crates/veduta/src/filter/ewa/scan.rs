@@ -40,11 +40,15 @@ fn scan<V: Vector, W: Weigh, const C: usize>(
     of: &Footprints,
     lane: usize,
 ) -> [f32; C] {
-    let [u, v] = of.centre.map(|centre| centre[lane]);
-    let [a, b, c] = of.equation.map(|coefficient| coefficient[lane]);
+    let (u, v) = (of.centre[0][lane], of.centre[1][lane]);
+    let (a, b, c) = (
+        of.equation[0][lane],
+        of.equation[1][lane],
+        of.equation[2][lane],
+    );
     let all = |value: f32| V::all(token, value);
-    let [first_column, first_row] = of.first.map(|first| first[lane]);
-    let [columns, rows] = of.count.map(|count| count[lane]);
+    let (first_column, first_row) = (of.first[0][lane], of.first[1][lane]);
+    let (columns, rows) = (of.count[0][lane], of.count[1][lane]);
     let (stride, pitch) = (planes.stride(), planes.stride() * planes.channels());
     let corner = planes
         .start(base[1] + first_row)
@@ -70,16 +74,18 @@ fn scan<V: Vector, W: Weigh, const C: usize>(
         }
         done += LANES as i32;
     }
-    let mean: [f32; C] = quotients(token, &sum, weight);
+    let mut mean: [f32; C] = quotients(token, &sum, weight);
     // Equal texels shall give just that value, which rounded sums do not.
     let middle = planes
         .start(base[1] + v.round() as i32)
         .wrapping_add_signed((base[0] + u.round() as i32) as isize);
-    std::array::from_fn(|channel| {
+    for (channel, mean) in mean.iter_mut().enumerate() {
         let texel = planes.samples()[middle + channel * stride];
-        let same = (mean[channel] - texel).abs() <= ROUNDING * texel.abs();
-        if same { texel } else { mean[channel] }
-    })
+        if (*mean - texel).abs() <= ROUNDING * texel.abs() {
+            *mean = texel;
+        }
+    }
+    mean
 }
 
 /// What rounding may add to a mean of a hundred texels, relative; a mean nearer than this to the texel in its middle is
@@ -88,15 +94,20 @@ const ROUNDING: f32 = 1e-6;
 
 #[inline(always)]
 fn quotients<V: Vector, const C: usize>(token: V::Token, sum: &[V; C], weight: V) -> [f32; C] {
-    let zero = V::all(token, 0.0);
-    let of = |k: usize| if k < C { sum[k] } else { zero };
-    let (totals, weight) = if C <= 3 {
-        let [x, y, z, weight] = V::sums([of(0), of(1), of(2), weight]);
-        ([x, y, z, 0.0], weight)
+    let mut four = [V::all(token, 0.0); 4];
+    let weight = if C <= 3 {
+        four[..C].copy_from_slice(sum);
+        four[3] = weight;
+        None
     } else {
-        let [weight, ..] = V::sums([weight, zero, zero, zero]);
-        (V::sums([of(0), of(1), of(2), of(3)]), weight)
+        four.copy_from_slice(&sum[..4]);
+        Some(V::sums([weight, weight, weight, weight])[0])
     };
-    let inverse = 1.0 / weight;
-    std::array::from_fn(|k| totals[k] * inverse)
+    let totals = V::sums(four);
+    let inverse = 1.0 / weight.unwrap_or(totals[3]);
+    let mut means = [0.0; C];
+    for (mean, total) in means.iter_mut().zip(totals) {
+        *mean = total * inverse;
+    }
+    means
 }
