@@ -3,8 +3,9 @@ use crate::talk::print;
 use clap::{Args, ValueEnum};
 use veduta_io::{scene_file_schema, views_file_schema};
 
-/// Print the JSON Schema of scene files, or of files of views, with which editors complete and check them
+/// Print the JSON Schema of scene files, or of files of views
 ///
+/// Editors complete and check files with it.
 /// With the first line `#:schema scene.schema.json` a scene file says where its schema is.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]

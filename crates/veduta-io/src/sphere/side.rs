@@ -159,7 +159,7 @@ impl Turn {
             return picture;
         }
         let (w, h) = (picture.width, picture.height);
-        let (width, height) = if self.quarters % 2 == 0 {
+        let (width, height) = if self.quarters.is_multiple_of(2) {
             (w, h)
         } else {
             (h, w)
@@ -182,7 +182,7 @@ impl Turn {
 impl fmt::Display for Turn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mirrored = if self.mirrored { "mirrored" } else { "" };
-        let and = if self.mirrored && self.quarters % 4 != 0 {
+        let and = if self.mirrored && !self.quarters.is_multiple_of(4) {
             " and "
         } else {
             ""

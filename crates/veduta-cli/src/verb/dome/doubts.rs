@@ -3,7 +3,7 @@
 use super::source::Frame;
 use veduta::accumulate::Picture;
 use veduta::reproject::Lens;
-use veduta_io::sphere::{Change, Side, View, fit};
+use veduta_io::sphere::{Change, Side, Turn, View, fit};
 
 /// Sentences about what seems wrong with the views of a frame.
 pub fn of(views: &[View], frame: &Frame) -> Vec<String> {
@@ -62,9 +62,6 @@ fn misfit(sides: &[&View], frame: &Frame) -> Option<String> {
 
 /// What to change, in words.
 fn in_words(changes: &[Change]) -> String {
-    if changes.len() == 6 && changes.iter().all(|change| change.turn.mirrored) {
-        return "all were mirrored and front and back, or left and right, exchanged: --handedness right".into();
-    }
     let one = |change: &Change| {
         let Change { place, from, turn } = change;
         match (place == from, turn.to_string()) {
@@ -73,7 +70,15 @@ fn in_words(changes: &[Change]) -> String {
             (false, turn) => format!("{place} were the picture of {from}, {turn}"),
         }
     };
-    changes.iter().map(one).collect::<Vec<_>>().join(", ")
+    let mut words = changes.iter().map(one).collect::<Vec<_>>().join(", ");
+    // Two that face each other, exchanged.
+    if let [a, b] = changes
+        && a.turn == Turn::NONE
+        && b.turn == Turn::NONE
+    {
+        words += ", or if all six were mirrored";
+    }
+    words
 }
 
 /// Less than this share of a picture is the rim of a lens.

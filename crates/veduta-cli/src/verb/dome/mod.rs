@@ -367,10 +367,12 @@ impl Dome {
         };
         let sizes = frame.as_ref().map_or(Vec::new(), Frame::sizes);
         if eye.seen.is_none() {
-            let views = match (&eye.files, &frame) {
+            let mut views = match (&eye.files, &frame) {
                 (Some(files), Some(frame)) => self.source.views(files, frame)?,
                 _ => self.card_views()?,
             };
+            // Where two views are equally near, the first is taken: the order of files is not to matter.
+            views.sort_by_key(|view| view.side);
             eye.seen = Some(self.look(sizes.clone(), views, frame.as_ref(), format, talk)?);
         }
         let seen = eye.seen.as_mut().expect("was just worked out");

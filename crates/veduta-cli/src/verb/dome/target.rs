@@ -327,8 +327,11 @@ fn is_exr(format: PictureFormat) -> bool {
     format == PictureFormat::Exr
 }
 
+/// How a side is called.
+type Naming = fn(Side) -> String;
+
 /// What stands in a name for a side, and how it is called there.
-const SIDE_NAMES: [(&str, fn(Side) -> String); 3] = [
+const SIDE_NAMES: [(&str, Naming); 3] = [
     ("{side}", |side| side.name().to_owned()),
     ("{letter}", |side| side.letter().to_string()),
     ("{axis}", |side| {
@@ -394,7 +397,11 @@ pub fn mask(text: &str) -> Result<[f64; 2], String> {
     let (fov, feather) = text.split_once(',').unwrap_or((text, "0"));
     let parsed = values::angle(fov).ok().zip(values::angle(feather).ok());
     match parsed {
-        Some((fov, feather)) if fov > 0.0 && fov < 6.2832 && (0.0..=fov).contains(&feather) => {
+        Some((fov, feather))
+            if fov > 0.0
+                && fov < std::f64::consts::TAU + 1e-9
+                && (0.0..=fov).contains(&feather) =>
+        {
             Ok([fov, feather])
         }
         _ => Err("expected an angle, or two, such as 180deg or 180deg,4deg".into()),
