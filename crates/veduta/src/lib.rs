@@ -15,6 +15,7 @@ pub mod dice;
 pub mod drawing;
 pub mod filter;
 pub mod pipeline;
+pub mod reproject;
 pub mod scene;
 pub mod shade;
 mod sweep;

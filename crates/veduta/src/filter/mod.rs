@@ -19,8 +19,10 @@
 //! however it lies to the pixels, and what a picture sums up to does not depend on the filter.
 
 mod kernel;
+mod planes;
 
 pub use kernel::{CellKernel, Kernel};
+pub use planes::{Planes, RowMut};
 
 /// A pixel filter.
 ///
