@@ -79,6 +79,13 @@ fn radians(text: &str) -> Option<f64> {
     Some(degrees.to_radians())
 }
 
+/// A finite angle in radians: `-11deg`, `90` or `0.7rad`.
+pub fn angle(text: &str) -> Result<f64, String> {
+    radians(text)
+        .filter(|angle| angle.is_finite())
+        .ok_or_else(|| "expected an angle such as 11deg or 0.7rad".into())
+}
+
 /// `X,Y,Z`, finite.
 pub fn vector(text: &str) -> Result<DVec3, String> {
     let numbers: Option<Vec<f64>> = text

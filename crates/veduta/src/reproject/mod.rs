@@ -8,6 +8,7 @@
 mod lens;
 mod names;
 mod orientation;
+pub mod patches;
 mod projection;
 
 pub use lens::{FisheyeLaw, Lens, LensPolynomial, Ray};

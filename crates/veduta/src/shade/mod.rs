@@ -10,6 +10,9 @@
 //!    ready for evaluation anywhere (`surface.rs`).
 //! 3. [`Surfaces::shade`] evaluates the parts of a band.
 //!
+//! Where a part lies in the image plane, its [`Ground`] tells: a grid of pixels, or the patches of a picture by another
+//! lens ([`PatchedPlaces`]).
+//!
 //! [`Points`] tells of a face what is not light: where its points are, and how they are turned.
 //!
 //! Of veils, faces that are not fully opaque, the opacity is evaluated beside the radiance. A part of a
@@ -19,10 +22,12 @@
 //! ([`Scene::lights`]) are not looked at.
 
 pub mod light;
+mod patched;
 mod points;
 mod surface;
 mod texture;
 
+pub use patched::PatchedPlaces;
 pub use points::Points;
 
 use crate::dice::{Part, Parts, PixelGrid};
