@@ -18,6 +18,7 @@
 //! Kernels sum to 1 over all pixels at any point ([`Kernel`]): no point of the scene counts more than another,
 //! however it lies to the pixels, and what a picture sums up to does not depend on the filter.
 
+pub mod ewa;
 mod kernel;
 mod planes;
 

@@ -14,6 +14,7 @@ pub struct Planes {
     height: u32,
     channels: usize,
     apron: u32,
+    repeats: bool,
     /// From a row to the next of the same channel's, and from a channel's to the next channel's, samples.
     stride: usize,
     /// Row by row, in a row channel by channel: the rows of one footprint lie near one another.
@@ -36,9 +37,21 @@ impl Planes {
             height,
             channels,
             apron,
+            repeats: false,
             stride,
             samples: vec![0.0; rows * channels * stride],
         }
+    }
+
+    /// Planes whose columns repeat: right of the last comes the first again, as in a panorama all around.
+    pub fn repeating(mut self) -> Self {
+        self.repeats = true;
+        self
+    }
+
+    /// Whether columns repeat.
+    pub fn repeats(&self) -> bool {
+        self.repeats
     }
 
     /// Width without the apron.
@@ -154,6 +167,8 @@ impl Planes {
         assert!(self.apron >= 2, "an apron for the weights");
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut half = Self::new(width, height, self.channels, apron);
+        // An odd number of columns does not repeat after half of them.
+        half.repeats = self.repeats && self.width % 2 == 0;
         for row in 0..height as i32 {
             for channel in 0..self.channels {
                 let of_row = |offset: i32| {
@@ -165,8 +180,7 @@ impl Planes {
                 let start = half.start(row) + channel * half.stride;
                 let results = &mut half.samples[start..start + width as usize];
                 for (column, result) in results.iter_mut().enumerate() {
-                    let along =
-                        [0, 1, 2, 3].map(|k| binomial(a, b, c, d, 2 * column + k));
+                    let along = [0, 1, 2, 3].map(|k| binomial(a, b, c, d, 2 * column + k));
                     *result = weighted(along);
                 }
             }
@@ -225,7 +239,11 @@ mod tests {
         for row in planes.rows() {
             for column in planes.columns() {
                 let set = row == 1 && (0..3).contains(&column);
-                let expected = if set { [7.0; 4] } else { [column as f32, row as f32, 1.0, 0.5] };
+                let expected = if set {
+                    [7.0; 4]
+                } else {
+                    [column as f32, row as f32, 1.0, 0.5]
+                };
                 assert_eq!(planes.texel(column, row), expected, "{column} {row}");
             }
         }

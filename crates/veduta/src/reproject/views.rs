@@ -11,8 +11,9 @@ use veduta_geometry::{DVec2, DVec3};
 #[derive(Clone, Debug)]
 pub struct Views {
     projections: Vec<Projection>,
-    /// Level by level, finest first; in each the planes of all views.
-    levels: Vec<Vec<Planes>>,
+    /// Of each view its levels, finest first.
+    pyramids: Vec<Vec<Planes>>,
+    /// How many levels there are to be.
     count: u32,
 }
 
@@ -25,11 +26,16 @@ impl Views {
     ///
     /// `channels` is 3 where all views are opaque, and 4 otherwise.
     pub(super) fn new(projections: &[Projection], channels: usize, apron: u32, count: u32) -> Self {
-        let finest = projections
-            .iter()
-            .map(|view| Planes::new(view.width, view.height, channels, apron));
+        let finest = projections.iter().map(|view| {
+            let planes = Planes::new(view.width, view.height, channels, apron);
+            if view.period() == Some(f64::from(view.width)) {
+                planes.repeating()
+            } else {
+                planes
+            }
+        });
         Self {
-            levels: vec![finest.collect()],
+            pyramids: finest.map(|planes| vec![planes]).collect(),
             projections: projections.to_vec(),
             count,
         }
@@ -42,7 +48,9 @@ impl Views {
 
     /// 3 where all views are opaque, else 4.
     pub fn channels(&self) -> usize {
-        self.levels[0].first().map_or(3, Planes::channels)
+        self.pyramids
+            .first()
+            .map_or(3, |levels| levels[0].channels())
     }
 
     /// Sets one row of a view's picture: RGBA in linear light, colour premultiplied by opacity, which is not looked at
@@ -51,7 +59,7 @@ impl Views {
     /// # Panics
     /// If there is no such view or row, or the number of texels is not its width.
     pub fn set_row(&mut self, view: usize, row: u32, texels: &[[f32; 4]]) {
-        self.levels[0][view].set_row(row, texels);
+        self.pyramids[view][0].set_row(row, texels);
     }
 
     /// Sets a view's picture.
@@ -59,7 +67,10 @@ impl Views {
     /// # Panics
     /// If there is no such view or the picture has another size.
     pub fn set(&mut self, view: usize, picture: &Picture) {
-        let size = [self.levels[0][view].width(), self.levels[0][view].height()];
+        let size = [
+            self.pyramids[view][0].width(),
+            self.pyramids[view][0].height(),
+        ];
         assert_eq!([picture.width, picture.height], size, "the view's size");
         let rows = picture.pixels.chunks_exact(picture.width as usize);
         for (row, texels) in rows.enumerate() {
@@ -72,49 +83,43 @@ impl Views {
     /// # Panics
     /// If there is no such view.
     pub fn planes_mut(&mut self, view: usize) -> &mut Planes {
-        &mut self.levels[0][view]
+        &mut self.pyramids[view][0]
     }
 
     /// Makes aprons and pyramids of the pictures that were set; to be called again after others are.
     pub fn complete(&mut self) {
-        self.levels.truncate(1);
-        loop {
-            let level = self.levels.len() - 1;
+        self.pyramids
+            .iter_mut()
+            .for_each(|levels| levels.truncate(1));
+        self.fill_aprons(0);
+        for level in 1..self.count as usize {
+            self.pyramids.par_iter_mut().for_each(|levels| {
+                let finer = &levels[level - 1];
+                levels.push(finer.halved(finer.apron()));
+            });
             self.fill_aprons(level);
-            if self.levels.len() as u32 >= self.count {
-                return;
-            }
-            let halved = self.levels[level]
-                .par_iter()
-                .map(|planes| planes.halved(planes.apron()));
-            let halved = halved.collect();
-            self.levels.push(halved);
         }
     }
 
-    /// The planes of all views at a level.
-    pub(super) fn level(&self, level: usize) -> &[Planes] {
-        &self.levels[level]
-    }
-
-    /// How many levels there are.
-    pub(super) fn level_count(&self) -> usize {
-        self.levels.len()
+    /// The levels of a view, finest first.
+    #[inline]
+    pub(super) fn pyramid(&self, view: usize) -> &[Planes] {
+        &self.pyramids[view]
     }
 
     fn fill_aprons(&mut self, level: usize) {
         // First a narrow ring, in which interpolation near a neighbour's edge has only that neighbour's texels; then
         // all, with the ring of the neighbours to interpolate in.
-        let apron = self.levels[level].first().map_or(0, Planes::apron);
+        let apron = self.pyramids.first().map_or(0, |levels| levels[0].apron());
         for (width, ring) in [(RING.min(apron), 0), (apron, RING.min(apron))] {
             let kernel = Kernel::cubic(0.0, 0.5);
             let aprons: Vec<Vec<_>> = (0..self.projections.len())
                 .into_par_iter()
                 .map(|view| self.apron(level, view, width as i32, ring as i32, &kernel))
                 .collect();
-            for (planes, apron) in self.levels[level].iter_mut().zip(aprons) {
+            for (levels, apron) in self.pyramids.iter_mut().zip(aprons) {
                 for (column, row, texel) in apron {
-                    planes.set(column, row, texel);
+                    levels[level].set(column, row, texel);
                 }
             }
         }
@@ -131,7 +136,7 @@ impl Views {
         kernel: &Kernel,
     ) -> Vec<(i32, i32, [f32; 4])> {
         let scale = f64::from(1_u32 << level);
-        let (projection, planes) = (&self.projections[view], &self.levels[level][view]);
+        let (projection, planes) = (&self.projections[view], &self.pyramids[view][level]);
         let [columns, rows] = [planes.width() as i32, planes.height() as i32];
         let mut found = Vec::new();
         for row in -width..rows + width {
@@ -154,7 +159,7 @@ impl Views {
                     .and_then(|direction| find(&self.projections, direction));
                 let texel = match other {
                     Some((other, image)) => {
-                        let planes = &self.levels[level][other];
+                        let planes = &self.pyramids[other][level];
                         interpolate(planes, image / scale - 0.5, ring, kernel)
                     }
                     // Nobody shows it: the border is continued.

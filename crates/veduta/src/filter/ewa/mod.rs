@@ -1,0 +1,246 @@
+//! The elliptical weighted average filter: a pixel's round footprint, mapped into a texture, becomes an ellipse, and the
+//! pixel the weighted mean of the texels inside.
+//!
+//! After Ned Greene & Paul Heckbert, "Creating raster Omnimax images from multiple perspective views using the elliptical
+//! weighted average filter" (1986). Comes in: a texture as [`Planes`], and of a pixel where its centre lies in it and
+//! the derivatives of the mapping. Goes out: the mean. In order:
+//!
+//! 1. `footprint`: from the derivatives to the ellipse, of eight pixels at once;
+//! 2. `scan`: the texels of one ellipse, eight of a row at once, weighed by a `profile`;
+//! 3. footprints larger than [`Ewa::pyramid`] says go to two levels of a pyramid instead (this file), whose own blur is
+//!    taken off the ellipse; those that reach over the apron, to `plain`.
+//!
+//! `plain` is the scan as the paper prints it. It serves footprints that wrap far around a panorama, and is what tests
+//! hold the quick one to. The departures from the paper are in `docs/papers.md`.
+//!
+//! `lanes` is written so that the compiler makes vector instructions of it: AVX2 ones where the machine has them,
+//! found out when the program runs, with the same results as without ([`vectorized`]).
+
+mod footprint;
+mod lanes;
+pub mod plain;
+mod profile;
+mod scan;
+
+pub use profile::Profile;
+
+pub(crate) use footprint::Footprints;
+pub(crate) use lanes::{LANES, Lanes};
+pub(crate) use scan::mean;
+
+use super::Planes;
+use pulp::{Arch, NullaryFnOnce};
+
+/// How the elliptical filter filters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ewa {
+    /// How texels are weighed.
+    pub profile: Profile,
+    /// Variance of what one texel stands for, in square texels: 1/12 for the mean over its area, as renderers and
+    /// cameras give it, 0 for a sample at its centre. The pixel's own ellipse is made smaller by it, else the picture
+    /// would be filtered twice.
+    pub variance: f32,
+    /// Radius in texels, of the smaller kind, that footprints have in the finer of two levels of a pyramid; those
+    /// larger than twice that use one. Smaller is quicker and less exact: 3 is good, 4 for masters. `None`: never,
+    /// so that the cost of a pixel grows with its area in the texture.
+    pub pyramid: Option<f32>,
+}
+
+impl Default for Ewa {
+    fn default() -> Self {
+        Self {
+            profile: Profile::Auto,
+            variance: 1.0 / 12.0,
+            pyramid: Some(3.0),
+        }
+    }
+}
+
+/// What footprints leave free of the apron: pixels whose centre is a little outside of the picture.
+const MARGIN: f32 = 2.5;
+
+/// Narrowest apron that the filter works with.
+pub const LEAST_APRON: u32 = 8;
+
+impl Ewa {
+    /// The mean of a footprint with its centre at (`u`, `v`), in texels with centres at whole numbers, and derivatives
+    /// `[ux, vx, uy, vy]` by the pixel's x and y.
+    ///
+    /// `levels` is a pyramid with filled aprons, finest first ([`Planes::halved`]), of `C` channels; one level will
+    /// do where [`pyramid`](Self::pyramid) is `None`. The centre lies in the picture, or not more than a texel
+    /// outside.
+    ///
+    /// # Panics
+    /// If the planes have not `C` channels, an apron narrower than [`LEAST_APRON`], or the centre lies farther outside.
+    pub fn sample<const C: usize>(
+        &self,
+        levels: &[Planes],
+        [u, v]: [f64; 2],
+        derivatives: [f32; 4],
+    ) -> [f32; C] {
+        let base = [u.floor(), v.floor()];
+        vectorized(Sampling::<C> {
+            ewa: self,
+            levels,
+            base: base.map(|x| x as i32),
+            part: [(u - base[0]) as f32, (v - base[1]) as f32],
+            derivatives,
+        })
+    }
+
+    /// The mean of one of eight footprints, whose derivatives are told again.
+    #[inline(always)]
+    pub(crate) fn of_lane<const C: usize>(
+        &self,
+        levels: &[Planes],
+        base: [i32; 2],
+        footprints: &Footprints,
+        derivatives: [f32; 4],
+        lane: usize,
+    ) -> [f32; C] {
+        let planes = &levels[0];
+        let near = footprints.reach.0[lane] <= planes.apron() as f32 - MARGIN;
+        let small = footprints.minor.0[lane] <= self.most_squared();
+        if near && small {
+            return mean(self, planes, base, footprints, lane);
+        }
+        let part = [footprints.u.0[lane], footprints.v.0[lane]];
+        self.large(levels, base, part, derivatives)
+    }
+
+    /// Squared minor radius above which a pyramid is used.
+    #[inline(always)]
+    fn most_squared(&self) -> f32 {
+        self.pyramid
+            .map_or(f32::INFINITY, |least| 4.0 * least * least)
+    }
+
+    /// The level, as a real number, for a footprint of this squared minor radius.
+    pub(crate) fn level(&self, minor_squared: f32) -> f32 {
+        match self.pyramid {
+            Some(least) if minor_squared > self.most_squared() => {
+                0.5 * (minor_squared / (least * least)).log2()
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// A footprint that is too large for the finest level or its apron.
+    #[inline(always)]
+    fn large<const C: usize>(
+        &self,
+        levels: &[Planes],
+        base: [i32; 2],
+        part: [f32; 2],
+        derivatives: [f32; 4],
+    ) -> [f32; C] {
+        // At a pole or a rim they may be without bound; nothing is larger than all of the picture.
+        let most = 2.0 * levels[0].width().max(levels[0].height()) as f32;
+        let derivatives = derivatives.map(|d| {
+            if d.is_nan() {
+                most
+            } else {
+                d.clamp(-most, most)
+            }
+        });
+        let centre = [0, 1].map(|k| f64::from(base[k]) + f64::from(part[k]));
+        let last = levels.len() - 1;
+        let level = self.level(minor_squared(derivatives)).min(last as f32);
+        let (finer, share) = (level.floor() as usize, level.fract());
+        let count = if share > 0.0 { 2 } else { 1 };
+        let mut result = [0.0; C];
+        for index in 0..count {
+            let mean: [f32; C] = self.at_level(levels, finer + index, centre, derivatives);
+            // The second by its difference to the first, so that equal values stay what they are.
+            let part = if index == 0 { 1.0 } else { share };
+            result = std::array::from_fn(|k| part.mul_add(mean[k] - result[k], result[k]));
+        }
+        result
+    }
+
+    /// The mean at one level, or at the first coarser one in which the footprint stays within the apron.
+    #[inline(always)]
+    fn at_level<const C: usize>(
+        &self,
+        levels: &[Planes],
+        level: usize,
+        centre: [f64; 2],
+        derivatives: [f32; 4],
+    ) -> [f32; C] {
+        let mut level = level;
+        loop {
+            let planes = &levels[level];
+            let scale = 1.0 / f64::from(1_u32 << level);
+            let centre = centre.map(|x| (x + 0.5) * scale - 0.5);
+            let base = centre.map(f64::floor);
+            let part = [0, 1].map(|k| Lanes::all((centre[k] - base[k]) as f32));
+            let variance = (0..level).fold(self.variance, |finer, _| 0.25 * (finer + 0.75));
+            let limit = planes.apron() as f32 - MARGIN;
+            let mut scaled = derivatives.map(|d| d * scale as f32);
+            let mut footprints = Footprints::new(self, variance, part, scaled.map(Lanes::all));
+            let reach = footprints.reach.0[0];
+            if reach > limit && planes.repeats() {
+                return plain::around(self, planes, centre, &footprints);
+            }
+            if reach > limit && level + 1 < levels.len() {
+                level += 1;
+                continue;
+            }
+            if reach > limit {
+                // Larger than all there is, at the coarsest level: what the apron shows of it.
+                scaled = scaled.map(|d| d * (limit / reach));
+                footprints = Footprints::new(self, variance, part, scaled.map(Lanes::all));
+            }
+            return mean(self, planes, base.map(|x| x as i32), &footprints, 0);
+        }
+    }
+}
+
+/// [`Ewa::sample`], to be inlined where the vector instructions are known.
+struct Sampling<'a, const C: usize> {
+    ewa: &'a Ewa,
+    levels: &'a [Planes],
+    base: [i32; 2],
+    part: [f32; 2],
+    derivatives: [f32; 4],
+}
+
+impl<const C: usize> NullaryFnOnce for Sampling<'_, C> {
+    type Output = [f32; C];
+
+    #[inline(always)]
+    fn call(self) -> [f32; C] {
+        let (ewa, steps) = (self.ewa, self.derivatives.map(Lanes::all));
+        let footprints = Footprints::new(ewa, ewa.variance, self.part.map(Lanes::all), steps);
+        ewa.of_lane(self.levels, self.base, &footprints, self.derivatives, 0)
+    }
+}
+
+/// Of footprints with these derivatives, the largest half extent and the squared minor radius of each, texels.
+pub(crate) struct Measuring<'a> {
+    pub ewa: &'a Ewa,
+    pub derivatives: [Lanes; 4],
+}
+
+impl NullaryFnOnce for Measuring<'_> {
+    type Output = [Lanes; 2];
+
+    #[inline(always)]
+    fn call(self) -> [Lanes; 2] {
+        let centre = [Lanes::all(0.0); 2];
+        let of = Footprints::new(self.ewa, self.ewa.variance, centre, self.derivatives);
+        [of.reach, of.minor]
+    }
+}
+
+/// Squared minor radius of the ellipse with these derivatives.
+pub(crate) fn minor_squared([ux, vx, uy, vy]: [f32; 4]) -> f32 {
+    let (s11, s12, s22) = (ux * ux + uy * uy, ux * vx + uy * vy, vx * vx + vy * vy);
+    let half = 0.5 * (s11 - s22);
+    (0.5 * (s11 + s22) - (half * half + s12 * s12).sqrt()).max(0.0)
+}
+
+/// Runs `work`, whose `call` is to be inlined, with the vector instructions that the machine has.
+pub(crate) fn vectorized<W: NullaryFnOnce>(work: W) -> W::Output {
+    Arch::new().dispatch(work)
+}

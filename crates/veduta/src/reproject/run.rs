@@ -1,0 +1,107 @@
+//! One band of rows: the tiles' polynomials, eight pixels at once, and the filter.
+
+use super::Views;
+use super::tiles::{Band, Single, Tile};
+use crate::filter::ewa::{Ewa, Footprints, LANES, Lanes};
+use pulp::NullaryFnOnce;
+
+/// Makes a band's pixels, `width` to a row, of `C` channels. To be run by
+/// [`vectorized`](crate::filter::ewa::vectorized).
+pub(super) struct Filtering<'a, const C: usize> {
+    pub ewa: &'a Ewa,
+    pub views: &'a Views,
+    pub band: &'a Band,
+    pub width: u32,
+    pub pixels: &'a mut [[f32; 4]],
+}
+
+impl<const C: usize> NullaryFnOnce for Filtering<'_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self {
+            ewa,
+            views,
+            band,
+            width,
+            pixels,
+        } = self;
+        pixels.fill([0.0; 4]);
+        for tile in &band.tiles {
+            of_tile::<C>(ewa, views, tile, width, pixels);
+        }
+        for of_pixel in band.singles.chunk_by(|a, b| a.pixel == b.pixel) {
+            pixels[of_pixel[0].pixel as usize] = of_singles::<C>(ewa, views, of_pixel);
+        }
+        for &(pixel, coverage) in &band.rim {
+            for value in &mut pixels[pixel as usize] {
+                *value *= coverage;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn of_tile<const C: usize>(
+    ewa: &Ewa,
+    views: &Views,
+    tile: &Tile,
+    width: u32,
+    pixels: &mut [[f32; 4]],
+) {
+    let levels = views.pyramid(tile.view as usize);
+    let [columns, rows] = tile.size;
+    let middle = tile.size.map(|size| 0.5 * size as f32 - 0.5);
+    for row in 0..rows {
+        let y = row as f32 - middle[1];
+        let start = ((tile.corner[1] + row) * width + tile.corner[0]) as usize;
+        let pixels = &mut pixels[start..start + columns as usize];
+        // In x alone: values, and derivatives by y.
+        let [[u, uy], [v, vy]] = tile.texel.map(|c| {
+            let value = |i: usize| y.mul_add(y.mul_add(c[6 + i], c[3 + i]), c[i]);
+            let slope = |i: usize| (2.0 * y).mul_add(c[6 + i], c[3 + i]);
+            [[0, 1, 2].map(value), [0, 1, 2].map(slope)]
+        });
+        for (chunk, pixels) in pixels.chunks_mut(LANES).enumerate() {
+            let x = Lanes::COUNT + Lanes::all((chunk * LANES) as f32 - middle[0]);
+            let along = |c: &[f32; 3]| x.polynomial(&[c[1], 2.0 * c[2]]);
+            let centre = [x.polynomial(&u), x.polynomial(&v)];
+            let steps = [along(&u), along(&v), x.polynomial(&uy), x.polynomial(&vy)];
+            let footprints = Footprints::new(ewa, ewa.variance, centre, steps);
+            for (lane, pixel) in pixels.iter_mut().enumerate() {
+                let derivatives = steps.map(|step| step.0[lane]);
+                let mean = ewa.of_lane::<C>(levels, tile.base, &footprints, derivatives, lane);
+                *pixel = with_opacity(mean);
+            }
+        }
+    }
+}
+
+/// A pixel from its parts, as the first and differences to it, so that equal parts give just that.
+#[inline(always)]
+fn of_singles<const C: usize>(ewa: &Ewa, views: &Views, singles: &[Single]) -> [f32; 4] {
+    let mut result = [0.0; C];
+    let mut first = [0.0; C];
+    for (index, single) in singles.iter().enumerate() {
+        let centre = single.part.map(Lanes::all);
+        let steps = single.derivatives.map(Lanes::all);
+        let footprints = Footprints::new(ewa, ewa.variance, centre, steps);
+        let levels = views.pyramid(single.view as usize);
+        let mean: [f32; C] = ewa.of_lane(levels, single.base, &footprints, single.derivatives, 0);
+        if index == 0 {
+            (result, first) = (mean, mean);
+        } else {
+            for k in 0..C {
+                result[k] += single.weight * (mean[k] - first[k]);
+            }
+        }
+    }
+    with_opacity(result)
+}
+
+/// RGBA of what has three channels, and is opaque, or four.
+#[inline(always)]
+fn with_opacity<const C: usize>(mean: [f32; C]) -> [f32; 4] {
+    std::array::from_fn(|k| if k < C { mean[k] } else { 1.0 })
+}
