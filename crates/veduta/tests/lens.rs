@@ -235,7 +235,9 @@ fn patches_show_everything_where_it_is() {
         let [width, height] = size_of(lens, 150);
         let projection = projection(&eye, lens, ASKEW, width, height);
         let subdivision = Subdivision::new(&projection);
-        let (mut patches, mut worst) = (Vec::new(), 0.0_f64);
+        let mut patches = Vec::new();
+        // In patches of a pixel and more, and in smaller ones.
+        let mut worst = [0.0_f64; 2];
         for first in (0..height).step_by(16) {
             subdivision.cut(first..(first + 16).min(height), &mut patches);
             for patch in &patches {
@@ -247,24 +249,31 @@ fn patches_show_everything_where_it_is() {
                     (u, v)
                 };
                 let point = a + (b - a) * u + (c - a) * v;
-                // Within a pixel of a pole, a hair's breadth may be half around.
-                let ends = [0.0, f64::from(height)];
-                if lens == Lens::Equirect && ends.iter().any(|y| (point.y - y).abs() < 1.0) {
-                    continue;
-                }
-                let Some(seen) = projection.image(patch_direction(patch.look(point)[0])) else {
+                // Within a pixel of a pole, which a whole row or rim may be, a hair's breadth is half around.
+                let from_middle = projection.lens_from_image(point);
+                let pixel = (projection.lens_from_image(DVec2::X) - projection.lens_from_image(DVec2::ZERO)).x;
+                let at_pole = match name {
+                    "equirect" => from_middle.y.abs() > 0.5 - pixel,
+                    "angular" => from_middle.length() > 1.0 - pixel,
+                    _ => false,
+                };
+                let direction = patch_direction(patch.look(point)[0]);
+                let Some(seen) = projection.image(direction).filter(|_| !at_pole) else {
                     continue;
                 };
                 let mut off = seen - point;
                 if let Some(period) = projection.period() {
                     off.x -= period * (off.x / period).round();
                 }
-                worst = worst.max(off.length());
+                let longest = (b - a).max_element().max((c - a).max_element());
+                let worst = &mut worst[usize::from(longest.max((c - b).max_element()) < 1.0)];
+                *worst = worst.max(off.length());
             }
         }
-        // The largest error in a patch is at most 4/3 of that in the middles of its sides.
-        assert!(worst < 1.5 * TOLERANCE, "{name}: off by {worst} pixels");
-        assert!(worst > 0.0, "{name}: no patch was looked at");
+        // The largest error in a patch is about 4/3 of that in the middles of its sides.
+        assert!(worst[0] < 1.5 * TOLERANCE, "{name}: off by {worst:?} pixels");
+        assert!(worst[1] < 8.0 * TOLERANCE, "{name}: off by {worst:?} pixels");
+        assert!(worst[0] > 0.0, "{name}: no patch was looked at");
     }
 }
 
@@ -343,7 +352,7 @@ fn a_picture_is_that_of_many_rays() {
         }
         let rms = (squares / f64::from(count)).sqrt();
         // Of a stratified sample; an edge that is misplaced by a tenth of a pixel would make more.
-        assert!(rms < 0.008, "{name}: off by {rms}");
+        assert!(rms < 0.006, "{name}: off by {rms}");
     }
 }
 
@@ -441,6 +450,7 @@ fn a_wire_stays_a_wire() {
 fn lit_ground() -> Scene {
     let texels = [[20, 40, 60, 255], [220, 200, 180, 255]];
     let image = Image {
+        name: "squares".into(),
         width: 8,
         height: 8,
         pixels: (0..64)
@@ -471,10 +481,7 @@ fn lit_ground() -> Scene {
         meshes,
         images: vec![image],
         materials: vec![Material {
-            base_color_texture: Some(TextureRef {
-                image: ImageId(0),
-                ..TextureRef::default()
-            }),
+            base_color_texture: Some(TextureRef::new(ImageId(0))),
             double_sided: true,
             ..Material::default()
         }],

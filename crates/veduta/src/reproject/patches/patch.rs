@@ -27,10 +27,11 @@ impl Patch {
     /// on a great circle, as at a pole: nothing has an extent there.
     pub fn new(corners: [DVec2; 3], directions: [DVec3; 3]) -> Option<Self> {
         let [d0, d1, d2] = directions;
-        let normals = [d1.cross(d2), d2.cross(d0), d0.cross(d1)];
-        let span = d0.dot(normals[0]);
-        let sides = [d1 - d0, d2 - d1, d0 - d2].map(DVec3::length_squared);
-        let longest = sides.into_iter().fold(0.0, f64::max);
+        // Of the differences, which are small and nearly exact, not of the directions, which are nearly the same.
+        let sides = [d2 - d1, d0 - d2, d1 - d0];
+        let normals = [d1.cross(sides[0]), d2.cross(sides[1]), d0.cross(sides[2])];
+        let span = d0.dot(sides[1].cross(sides[2]));
+        let longest = sides.map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
         if span.is_nan() || span.abs() <= LEAST_SPAN * longest {
             return None;
         }
