@@ -85,12 +85,7 @@ pub(super) trait Ground {
     fn place_of(&self, part: usize, pixel: u32) -> Self::Place;
 
     /// What of a fragment lies there, measured from the pixel's top left corner.
-    fn clip<'b>(
-        &self,
-        place: Self::Place,
-        fragment: u32,
-        clip: &'b mut PixelClip,
-    ) -> &'b [DVec2];
+    fn clip<'b>(&self, place: Self::Place, fragment: u32, clip: &'b mut PixelClip) -> &'b [DVec2];
 
     /// Nearness there as a function of pixel coordinates from that corner, up to a factor that is positive
     /// and the same for all.
@@ -205,7 +200,9 @@ struct Pixel<'a, G: Ground, D: Diced> {
 impl<G: Ground, D: Diced> Pixel<'_, G, D> {
     /// Makes layers of the parts of veils. What lets all through is done.
     fn lay(&mut self, veils: &[(G::Place, u32)], opacities: &[f32], first_veil: usize) {
-        let Self { map, ground, place, .. } = *self;
+        let Self {
+            map, ground, place, ..
+        } = *self;
         let VeilBuffers {
             layers,
             points,

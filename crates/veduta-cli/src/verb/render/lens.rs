@@ -276,11 +276,7 @@ impl LensOptions {
     /// How the lens is turned with respect to the line of sight.
     fn orientation(&self, usual_elevation: f64) -> Orientation {
         let elevation = self.elevation.unwrap_or(usual_elevation);
-        Orientation::from_angles(
-            self.yaw.unwrap_or(0.0),
-            elevation,
-            self.roll.unwrap_or(0.0),
-        )
+        Orientation::from_angles(self.yaw.unwrap_or(0.0), elevation, self.roll.unwrap_or(0.0))
     }
 
     /// The eye turned as the lens is.

@@ -31,7 +31,10 @@ impl Patch {
         let sides = [d2 - d1, d0 - d2, d1 - d0];
         let normals = [d1.cross(sides[0]), d2.cross(sides[1]), d0.cross(sides[2])];
         let span = d0.dot(sides[1].cross(sides[2]));
-        let longest = sides.map(DVec3::length_squared).into_iter().fold(0.0, f64::max);
+        let longest = sides
+            .map(DVec3::length_squared)
+            .into_iter()
+            .fold(0.0, f64::max);
         if span.is_nan() || span.abs() <= LEAST_SPAN * longest {
             return None;
         }

@@ -15,6 +15,7 @@ const TOLERANCE_WITHIN_PIXEL: f64 = 1.0 / 16.0;
 
 /// How far from its place anything may be seen in a patch larger than a pixel, by the patch's size. The local scale
 /// is off by up to nine times as much in a corner of a patch, and with it the brightness of wires; on average it is right.
+/// Where a lens stretches what it shows, as panoramas do towards their poles, it may be off by as much more.
 const LEAST_STRAIGHTNESS: f64 = 1.0 / 1200.0;
 
 /// An arc of angle t whose directions are mixed linearly is right in its middle, and off by about 0.021 t^3 at its
@@ -293,7 +294,7 @@ impl<'a> Block<'a> {
         };
         let (triangles, off) = straightest;
         let tolerance = match side {
-            side if side > 1.0 => TOLERANCE.min(LEAST_STRAIGHTNESS * side),
+            side if side > 1.0 => TOLERANCE.min(LEAST_STRAIGHTNESS * cell.stretch() * side),
             1.0 => TOLERANCE,
             _ => TOLERANCE_WITHIN_PIXEL,
         };
@@ -386,7 +387,9 @@ impl<'a> Block<'a> {
             .collect();
         let side = (cell.max - cell.min)[longer];
         let off = |triangle: &[DVec2; 3]| self.off_of_triangle(triangle);
-        if side > LEAST_SIDE && triangles.iter().map(off).fold(0.0, f64::max) > TOLERANCE_WITHIN_PIXEL {
+        if side > LEAST_SIDE
+            && triangles.iter().map(off).fold(0.0, f64::max) > TOLERANCE_WITHIN_PIXEL
+        {
             return self.divide_along(cell, longer, patches);
         }
         for triangle in triangles {
@@ -504,6 +507,19 @@ impl Cell {
             _ => self.max[axis],
         };
         DVec2::new(along(0, column), along(1, row))
+    }
+
+    /// How much longer than wide a small round thing is shown, if along x or y.
+    fn stretch(&self) -> f64 {
+        let size = self.max - self.min;
+        let along = |ends: [Option<DVec3>; 2], length: f64| match ends {
+            [Some(a), Some(b)] => (b - a).length() / length,
+            _ => 0.0,
+        };
+        let x = along([self.directions[1][0], self.directions[1][2]], size.x);
+        let y = along([self.directions[0][1], self.directions[2][1]], size.y);
+        let stretch = x.max(y) / x.min(y);
+        if stretch.is_finite() { stretch } else { 1.0 }
     }
 
     /// How far a patch may be off between the end of a side and its middle while it is right in the middle, which
