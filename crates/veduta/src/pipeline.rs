@@ -16,7 +16,8 @@ mod mattes;
 pub use deep::{deep_window, render_deep};
 pub use frames::{Extent, FrameStep, FrameWork, Frames};
 pub use lens::{
-    SeenView, Surroundings, find_surroundings, lens_coverage, render_cube, render_surroundings,
+    SeenView, Surroundings, find_surroundings, lens_coverage, render_cube, render_filtered,
+    render_surroundings,
 };
 pub use local::render_region;
 

@@ -509,6 +509,56 @@ fn lit_ground() -> Scene {
     }
 }
 
+/// Pixels along the side of the squares in which means are compared.
+const SQUARE: u32 = 8;
+
+#[test]
+fn filtered_pictures_of_the_cubes_faces_have_the_same_means() {
+    let scene = ball_around(&mut Rng::new(7), 10, 14);
+    let eye = eye(DVec3::Z, 0.2);
+    for name in ["domemaster", "omnimax:full", "equirect", "ball"] {
+        let lens = lens(name);
+        let [width, height] = size_of(lens, 96);
+        let projection = projection(&eye, lens, ASKEW, width, height);
+        let exact = picture_of(&scene, &eye, &projection);
+        let (filtered, faces) =
+            pipeline::render_filtered(&scene, &eye, &projection, 192, true, |_| {});
+        assert!(faces.len() > 3, "{name}: {faces:?}");
+        let mut worst = 0.0_f64;
+        let mut count = 0;
+        for top in (0..height - SQUARE).step_by(SQUARE as usize) {
+            for left in (0..width - SQUARE).step_by(SQUARE as usize) {
+                let pixels = (0..SQUARE * SQUARE).map(|k| (left + k % SQUARE, top + k / SQUARE));
+                let inside = |(x, y): (u32, u32)| projection.coverage(x, y) == 1.0;
+                // Along a pole's row and a ball's rim, a footprint is no ellipse.
+                let middle = projection.lens_from_image(DVec2::new(
+                    f64::from(left + SQUARE / 2),
+                    f64::from(top + SQUARE / 2),
+                ));
+                let is_plain = match name {
+                    "ball" => middle.length() < 0.8,
+                    "equirect" => middle.y.abs() < 0.35,
+                    _ => true,
+                };
+                if !is_plain || !pixels.clone().all(inside) {
+                    continue;
+                }
+                for channel in 0..4 {
+                    let mean = |picture: &Picture| {
+                        let values = pixels.clone().map(|(x, y)| {
+                            f64::from(picture.pixels[(y * width + x) as usize][channel])
+                        });
+                        values.sum::<f64>() / f64::from(SQUARE * SQUARE)
+                    };
+                    worst = worst.max((mean(&exact) - mean(&filtered)).abs());
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 100 && worst < 0.02, "{name}: off by {worst}");
+    }
+}
+
 #[test]
 fn a_perspective_lens_makes_what_a_camera_makes() {
     let scene = lit_ground();

@@ -10,14 +10,16 @@ use crate::accumulate::{self, Picture};
 use crate::dice::{
     self, Coverage, PatchDicer, PatchedBand, PatchedParts, PatchedView, VeilBuffers,
 };
-use crate::reproject::Projection;
+use crate::filter::ewa::Ewa;
 use crate::reproject::patches::{CubeFace, CubeView, Patch, Subdivision, cube_views};
+use crate::reproject::{Lens, Projection, Reprojection};
 use crate::scene::Scene;
 use crate::shade::light::Daylight;
 use crate::shade::{PatchedPlaces, Radiance, Surfaces, Textures};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use veduta_geometry::DVec2;
 use veduta_map::{Camera, ObjectId, VisibilityMap};
@@ -163,6 +165,50 @@ pub fn render_surroundings(
         height,
         pixels,
     }
+}
+
+/// The picture of a lens, filtered from pictures of the cube's faces of `side` pixels in place of exact areas: those
+/// that the lens looks at are made, and weighed by ellipses (Greene & Heckbert 1986). Only what is needed is made; tells
+/// which faces that is.
+///
+/// `begin` is told of each step.
+///
+/// # Panics
+/// If `side` is 0, or the pictures are too large for the machine's memory.
+pub fn render_filtered(
+    scene: &Scene,
+    eye: &Camera,
+    projection: &Projection,
+    side: u32,
+    unlit: bool,
+    mut begin: impl FnMut(Step),
+) -> (Picture, Vec<CubeFace>) {
+    begin(Step::FollowingLens);
+    let lens = Lens::Perspective { fov: FRAC_PI_2 };
+    let sources = CubeFace::ALL.map(|face| Projection::new(lens, face.orientation(), side, side));
+    let reprojection = Reprojection::new(&sources, projection, &Ewa::default());
+    let whole = [DVec2::ZERO, DVec2::ONE];
+    let views = cube_views(eye, |_| [Some(whole); 6]);
+    let needs = reprojection.needs();
+    let needed = |index: &usize| needs[*index].window.is_some();
+    let needed: Vec<usize> = (0..views.len()).filter(needed).collect();
+    let mut planes = reprojection.views(false);
+    let settings = RenderSettings {
+        width: side,
+        height: side,
+        unlit,
+        ..RenderSettings::default()
+    };
+    for (index, &face) in needed.iter().enumerate() {
+        let count = needed.len();
+        begin(Step::View { index, count });
+        let picture = render(scene, &views[face].camera, &settings, |_| {}).picture;
+        planes.set(face, &picture);
+    }
+    begin(Step::Shading);
+    planes.complete();
+    let faces = needed.into_iter().map(|face| views[face].face);
+    (reprojection.picture(&planes), faces.collect())
 }
 
 /// Makes the faces of the cube around `eye` as one picture, each of the size that `settings` tell: a cross as

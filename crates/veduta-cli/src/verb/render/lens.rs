@@ -5,7 +5,7 @@ use crate::exit::{Code, Failure};
 use crate::preview::Screen;
 use crate::talk::{Talk, print, print_bytes};
 use crate::values::{self, Size};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use std::fmt;
 use std::str::FromStr;
 use veduta::accumulate::Picture;
@@ -13,7 +13,7 @@ use veduta::map::{self, Camera};
 use veduta::pipeline::{self, RenderSettings, Sampling, Surroundings};
 use veduta::reproject::{LENS_NAMES, Lens, Orientation, Projection};
 use veduta::scene::{Bounds, Scene};
-use veduta_geometry::DVec3;
+use veduta_geometry::{DVec2, DVec3};
 use veduta_io::{Loaded, scaled};
 
 /// By which lens the picture is made.
@@ -30,6 +30,10 @@ pub struct LensOptions {
     /// not for it. Not made by a lens: vector pictures, .veduta, --deep, --aov, --filter, --sampling multiscan.
     #[arg(long, value_name = "LENS")]
     pub lens: Option<LensArgument>,
+    /// How a lens's picture is made: exact regions, or ewa: by ellipses from pictures of the cube's faces, softer, and
+    /// blind to what their pixels do not show
+    #[arg(long, value_name = "HOW", default_value = "exact", requires = "lens")]
+    lens_filter: LensFilter,
     /// How far the lens's axis is raised above the line of sight: 90deg for domemaster, 11deg for omnimax, else 0
     #[arg(long, value_name = "ANGLE", value_parser = values::angle, allow_hyphen_values = true, requires = "lens")]
     elevation: Option<f64>,
@@ -40,6 +44,22 @@ pub struct LensOptions {
     #[arg(long, value_name = "ANGLE", value_parser = values::angle, allow_hyphen_values = true, requires = "lens")]
     roll: Option<f64>,
 }
+
+/// `--lens-filter`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LensFilter {
+    /// Exact areas in the lens's own pixels
+    Exact,
+    /// The elliptical weighted average of Greene & Heckbert (1986)
+    Ewa,
+}
+
+/// Pixels along a face of the cube for each pixel of the lens in the same angle, at least, where its picture is
+/// filtered. Less blurs; more costs time.
+const FACE_PIXELS: f64 = 2.0;
+
+/// The largest face of the cube, in pixels.
+const MOST_FACE: f64 = 8192.0;
 
 /// `--lens`
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,6 +167,10 @@ impl Render {
         }
         if lens == LensArgument::Cube {
             refuse_no_cross(size)?;
+            if self.lens.lens_filter == LensFilter::Ewa {
+                let message = "the faces of a cube are made as they are; leave --lens-filter out";
+                return Err(Failure::new(Code::Usage, message));
+            }
         }
         let loaded = self.load(talk)?;
         let eye = self.view.eye_of_lens(self, &loaded, size)?;
@@ -229,6 +253,18 @@ impl Render {
     ) -> (Picture, serde_json::Value) {
         let orientation = self.lens.orientation(lens.usual_elevation());
         let projection = Projection::new(lens, orientation, size.width, size.height);
+        if self.lens.lens_filter == LensFilter::Ewa {
+            let side = face_side(&projection);
+            let unlit = self.look.unlit;
+            let begin = |step| tell_step(step, talk);
+            let (picture, faces) =
+                pipeline::render_filtered(scene, eye, &projection, side, unlit, begin);
+            let faces: Vec<&str> = faces.into_iter().map(|face| face.name()).collect();
+            return (
+                picture,
+                serde_json::json!({ "faceSide": side, "views": faces }),
+            );
+        }
         let surroundings = pipeline::find_surroundings(scene, eye, &projection, |step| {
             tell_step(step, talk);
         });
@@ -237,6 +273,19 @@ impl Render {
         let picture = pipeline::render_surroundings(scene, &surroundings, &projection, unlit);
         (picture, told_of(&surroundings))
     }
+}
+
+/// Pixels along the side of the cube's faces from which a picture is filtered: by the lens's scale at its middle, where
+/// round lenses show most.
+fn face_side(projection: &Projection) -> u32 {
+    let middle = projection.image_from_lens(DVec2::ZERO);
+    let per_pixel = projection
+        .ray(middle)
+        .map_or(DVec3::ONE, |ray| ray.derivatives[1])
+        .length();
+    // A face is two radians wide by the scale of its own middle, where it shows least.
+    let side = (FACE_PIXELS * 2.0 / per_pixel).min(MOST_FACE);
+    (side as u32).next_multiple_of(64)
 }
 
 fn told_of(surroundings: &Surroundings) -> serde_json::Value {

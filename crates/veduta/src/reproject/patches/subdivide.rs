@@ -305,7 +305,8 @@ impl<'a> Block<'a> {
             }
             return;
         }
-        let axis = if sides <= tolerance {
+        // A pole is infinitely far off either way.
+        let axis = if sides <= tolerance || sides.is_infinite() {
             longer
         } else {
             usize::from(off.along_x < CLEARLY * off.along_y)

@@ -1,6 +1,7 @@
 //! Which parts of the faces of a cube around the eye are looked at, and the cameras that see them.
 
 use super::Patch;
+use crate::reproject::Orientation;
 use veduta_geometry::{DMat3, DMat4, DVec2, DVec3};
 use veduta_map::{Camera, Projection};
 
@@ -42,6 +43,14 @@ impl CubeFace {
             Self::Top => "top",
             Self::Bottom => "bottom",
         }
+    }
+
+    /// How the face's picture is turned in the world of the eye: right, up and backward.
+    pub fn orientation(self) -> Orientation {
+        let of_eye = self.turn().transpose();
+        let [down, forward] = [of_eye.y_axis, of_eye.z_axis];
+        let world = |axis: DVec3| DVec3::new(axis.x, -axis.y, -axis.z);
+        Orientation::looking(world(forward), world(-down)).expect("the axes of a cube")
     }
 
     /// Directions of the face's own eye space (x right, y down, z forward) from those of the eye. Only signs and
