@@ -208,9 +208,9 @@ fn what_is_all_around_fills_every_pixel_and_the_rim_as_far_as_it_goes() {
     for name in LENSES {
         let lens = lens(name);
         for (eye, looking, width) in [
-            (eye(DVec3::Z, 0.0), [DVec3::Y, DVec3::Z], 40),
-            (eye(DVec3::Z, 0.0), [DVec3::Z, -DVec3::Y], 33),
-            (eye(DVec3::new(1.0, 2.0, -0.7), 0.8), ASKEW, 37),
+            (eye(DVec3::Z, 0.0), [DVec3::Y, DVec3::Z], 30),
+            (eye(DVec3::Z, 0.0), [DVec3::Z, -DVec3::Y], 23),
+            (eye(DVec3::new(1.0, 2.0, -0.7), 0.8), ASKEW, 27),
         ] {
             let [width, height] = size_of(lens, width);
             let projection = projection(&eye, lens, looking, width, height);
@@ -232,7 +232,7 @@ fn patches_show_everything_where_it_is() {
     for name in LENSES {
         let lens = lens(name);
         let eye = eye(DVec3::Z, 0.0);
-        let [width, height] = size_of(lens, 150);
+        let [width, height] = size_of(lens, 110);
         let projection = projection(&eye, lens, ASKEW, width, height);
         let subdivision = Subdivision::new(&projection);
         let mut patches = Vec::new();
@@ -403,9 +403,9 @@ fn a_wire_stays_a_wire() {
         let lens = lens(name);
         // So large that the scale of the lens does not change by more than a per cent or two from pixel to pixel.
         for width in if lens.is_round() {
-            [200, 640]
+            [200, 440]
         } else {
-            [400, 900]
+            [400, 600]
         } {
             let [width, height] = size_of(lens, width);
             let projection = projection(&eye, lens, looking, width, height);

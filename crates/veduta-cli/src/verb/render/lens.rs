@@ -131,7 +131,7 @@ impl Render {
         ];
         if let Some((_, what)) = not_made.into_iter().find(|not_made| not_made.0) {
             let message = format!(
-                "{what} are not made by a lens; leave --lens {lens} out, or make a picture of pixels, by area"
+                "{what}: not made by a lens; leave --lens {lens} out, or make a picture of pixels, by area"
             );
             return Err(Failure::new(Code::Unsupported, message));
         }

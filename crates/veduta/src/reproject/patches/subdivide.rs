@@ -117,10 +117,18 @@ struct Cell {
 }
 
 /// How far the patches of a cell are off, in pixels: along x, along y, and in the middle.
+#[derive(Clone, Copy)]
 struct Off {
     along_x: f64,
     along_y: f64,
     middle: f64,
+}
+
+/// A cell cut along a diagonal.
+struct TwoPatches {
+    /// Corners, and the patch unless its directions lie on a line.
+    triangles: [([DVec2; 3], Option<Patch>); 2],
+    off: Off,
 }
 
 impl<'a> Block<'a> {
@@ -287,23 +295,19 @@ impl<'a> Block<'a> {
     /// Makes two patches of a cell if the lens is straight enough in it, else divides it.
     fn cut_straight(&mut self, cell: &Cell, longer: usize, patches: &mut Vec<Patch>) {
         let side = (cell.max - cell.min)[longer];
-        let made = [false, true].map(|falling| self.two_patches(cell, falling));
-        let straightest = match &made {
-            [a, b] if b.1.middle < CLEARLY * a.1.middle => b,
-            [a, _] => a,
-        };
-        let (triangles, off) = straightest;
         let tolerance = match side {
             side if side > 1.0 => TOLERANCE.min(LEAST_STRAIGHTNESS * cell.stretch() * side),
             1.0 => TOLERANCE,
             _ => TOLERANCE_WITHIN_PIXEL,
         };
-        let sides = off.along_x.max(off.along_y);
-        if sides.max(off.middle) <= tolerance {
-            for &triangle in triangles {
-                self.push(triangle, patches);
-            }
-            return;
+        let mut made = cell.two_patches(false);
+        let sides = made.off.along_x.max(made.off.along_y);
+        // The sides are the same whichever the diagonal.
+        if sides <= tolerance && made.off.middle > tolerance {
+            made = cell.two_patches(true);
+        }
+        if sides.max(made.off.middle) <= tolerance {
+            return self.push_both(&made, patches);
         }
         // A pole is infinitely far off either way.
         let axis = if sides <= tolerance || sides.is_infinite() {
@@ -318,49 +322,9 @@ impl<'a> Block<'a> {
             axis
         };
         if (cell.max - cell.min)[axis] <= LEAST_SIDE {
-            for &triangle in triangles {
-                self.push(triangle, patches);
-            }
-            return;
+            return self.push_both(&made, patches);
         }
         self.divide_along(cell, axis, patches);
-    }
-
-    /// A cell cut along a diagonal, falling (from the top left) or rising, and how far it is off.
-    fn two_patches(&self, cell: &Cell, falling: bool) -> ([[DVec2; 3]; 2], Off) {
-        // Corners by column and row; the diagonal leads from the first to the last of each.
-        let triangles = if falling {
-            [[(0, 0), (2, 0), (2, 2)], [(2, 2), (0, 2), (0, 0)]]
-        } else {
-            [[(2, 0), (2, 2), (0, 2)], [(0, 2), (0, 0), (2, 0)]]
-        };
-        let mut off = Off {
-            along_x: 0.0,
-            along_y: 0.0,
-            middle: 0.0,
-        };
-        let points = triangles.map(|corners| {
-            let points = corners.map(|(i, j)| cell.point(i, j));
-            let directions = corners.map(|(i, j)| cell.directions[j][i]);
-            let patch = match directions {
-                [Some(a), Some(b), Some(c)] => Patch::new(points, [a, b, c]),
-                _ => None,
-            };
-            for (k, (i, j)) in corners.into_iter().enumerate() {
-                let (next_i, next_j) = corners[(k + 1) % 3];
-                let between = ((i + next_i) / 2, (j + next_j) / 2);
-                let here = cell.off_at(patch.as_ref(), between)
-                    + cell.off_beside_middle((i, j), (next_i, next_j));
-                let worst = match (i == next_i, j == next_j) {
-                    (false, true) => &mut off.along_x,
-                    (true, false) => &mut off.along_y,
-                    _ => &mut off.middle,
-                };
-                *worst = worst.max(here);
-            }
-            points
-        });
-        (points, off)
     }
 
     /// Makes patches of what of a small cell lies on the inner side of the rim.
@@ -428,6 +392,15 @@ impl<'a> Block<'a> {
         off.fold(0.0, f64::max)
     }
 
+    fn push_both(&mut self, made: &TwoPatches, patches: &mut Vec<Patch>) {
+        for (corners, patch) in &made.triangles {
+            match patch {
+                Some(patch) => self.put(*patch, patches),
+                None => self.push(*corners, patches),
+            }
+        }
+    }
+
     /// Adds the patch of a triangle. Where the directions of its corners lie on a line (at a pole) they are taken
     /// from nearer to its middle.
     fn push(&mut self, corners: [DVec2; 3], patches: &mut Vec<Patch>) {
@@ -441,10 +414,13 @@ impl<'a> Block<'a> {
         let Some(patch) = patch_of(corners).or_else(|| patch_of(nearer())) else {
             return;
         };
-        let [columns, rows] = self.pixels(
-            corners[0].min(corners[1]).min(corners[2]),
-            corners[0].max(corners[1]).max(corners[2]),
-        );
+        self.put(patch, patches);
+    }
+
+    /// Adds a patch.
+    fn put(&mut self, patch: Patch, patches: &mut Vec<Patch>) {
+        let [a, b, c] = *patch.corners();
+        let [columns, rows] = self.pixels(a.min(b).min(c), a.max(b).max(c));
         let pixel = (rows.start * BLOCK + columns.start) as usize;
         if columns.len() * rows.len() == 1 && self.shares[pixel] < 1.0 {
             self.at_rim.push((pixel, patches.len()));
@@ -508,6 +484,43 @@ impl Cell {
             _ => self.max[axis],
         };
         DVec2::new(along(0, column), along(1, row))
+    }
+
+    /// The cell cut along a diagonal, falling (from the top left) or rising, and how far it is off.
+    fn two_patches(&self, falling: bool) -> TwoPatches {
+        // Corners by column and row; the diagonal leads from the first to the last of each.
+        let triangles = if falling {
+            [[(0, 0), (2, 0), (2, 2)], [(2, 2), (0, 2), (0, 0)]]
+        } else {
+            [[(2, 0), (2, 2), (0, 2)], [(0, 2), (0, 0), (2, 0)]]
+        };
+        let mut off = Off {
+            along_x: 0.0,
+            along_y: 0.0,
+            middle: 0.0,
+        };
+        let triangles = triangles.map(|corners| {
+            let points = corners.map(|(i, j)| self.point(i, j));
+            let directions = corners.map(|(i, j)| self.directions[j][i]);
+            let patch = match directions {
+                [Some(a), Some(b), Some(c)] => Patch::new(points, [a, b, c]),
+                _ => None,
+            };
+            for (k, (i, j)) in corners.into_iter().enumerate() {
+                let (next_i, next_j) = corners[(k + 1) % 3];
+                let between = ((i + next_i) / 2, (j + next_j) / 2);
+                let here = self.off_at(patch.as_ref(), between)
+                    + self.off_beside_middle((i, j), (next_i, next_j));
+                let worst = match (i == next_i, j == next_j) {
+                    (false, true) => &mut off.along_x,
+                    (true, false) => &mut off.along_y,
+                    _ => &mut off.middle,
+                };
+                *worst = worst.max(here);
+            }
+            (points, patch)
+        });
+        TwoPatches { triangles, off }
     }
 
     /// How much longer than wide a small round thing is shown, if along x or y.
