@@ -7,6 +7,7 @@
 pub mod cases;
 pub mod composite;
 pub mod deep;
+pub mod dome;
 pub mod exchange;
 pub mod fit;
 pub mod glb;

@@ -13,6 +13,7 @@ use veduta::visibility::multiscan;
 use veduta_bench::cases::Case;
 use veduta_bench::composite::stored_times;
 use veduta_bench::deep;
+use veduta_bench::dome::Job;
 use veduta_bench::fit::Line;
 use veduta_bench::peers;
 use veduta_bench::table::Table;
@@ -26,6 +27,9 @@ Usage: veduta-bench TABLE [SCENE[@WIDTHxHEIGHT]...]
        veduta-bench own SCENE[@WIDTHxHEIGHT] EXPORTED_FILE PICTURE.npy
        veduta-bench deep PAIR SAMPLES FOLDER
        veduta-bench difference EXACT_PICTURE PICTURE
+       veduta-bench dome-files FACES WIDTH FOLDER
+       veduta-bench dome-own FACES WIDTH PROFILE THREADS FOLDER
+       veduta-bench dome-printed FACES WIDTH
 
 Tables:
   n-et      multiscan with n sub-scanlines, the slope and intercept of its time over n, and
@@ -46,7 +50,10 @@ For benches/peers:
   reference  its exact picture in flat colours
   own        our CPU seconds to that picture, as JSON
   deep       two scenes as stored maps and as deep pictures of SAMPLES x SAMPLES samples a pixel
-  difference  how many pixels of a picture are off, as JSON";
+  difference  how many pixels of a picture are off, as JSON
+  dome-files  faces of a cube with zone plates, and their exact picture in a dome
+  dome-own   our CPU seconds to that picture by a profile of the elliptical filter, as JSON
+  dome-printed  CPU seconds of the filter as Greene & Heckbert print it";
 
 /// Rounds of measuring, for scenes that do not take long.
 const ROUNDS: u32 = 5;
@@ -200,6 +207,18 @@ fn main() -> ExitCode {
         ("deep", [pair, samples, folder]) => write_deep(pair, samples, folder),
         ("difference", [exact, picture]) => {
             deep::difference(Path::new(exact), Path::new(picture)).map(|told| println!("{told}"))
+        }
+        ("dome-files", [faces, width, folder]) => {
+            Job::parse(faces, width).and_then(|job| job.write(Path::new(folder)))
+        }
+        ("dome-own", [faces, width, profile, threads, folder]) => Job::parse(faces, width)
+            .and_then(|job| {
+                let threads = threads.parse().map_err(|_| format!("{threads} threads"))?;
+                job.own(profile, threads, Path::new(folder))
+            })
+            .map(|times| println!("{times}")),
+        ("dome-printed", [faces, width]) => {
+            Job::parse(faces, width).map(|job| println!("{:.3}", job.printed()))
         }
         _ => print_table(name, scenes),
     };

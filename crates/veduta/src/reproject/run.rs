@@ -2,8 +2,7 @@
 
 use super::Views;
 use super::tiles::{Band, Single, Tile};
-use crate::filter::ewa::{Ewa, Footprints, LANES, Lanes};
-use pulp::NullaryFnOnce;
+use crate::filter::ewa::{Ewa, Footprints, LANES, Vector, Work};
 
 /// Makes a band's pixels, `width` to a row, of `C` channels. To be run by
 /// [`vectorized`](crate::filter::ewa::vectorized).
@@ -15,11 +14,11 @@ pub(super) struct Filtering<'a, const C: usize> {
     pub pixels: &'a mut [[f32; 4]],
 }
 
-impl<const C: usize> NullaryFnOnce for Filtering<'_, C> {
+impl<const C: usize> Work for Filtering<'_, C> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
+    fn run<V: Vector>(self, token: V::Token) {
         let Self {
             ewa,
             views,
@@ -29,10 +28,10 @@ impl<const C: usize> NullaryFnOnce for Filtering<'_, C> {
         } = self;
         pixels.fill([0.0; 4]);
         for tile in &band.tiles {
-            of_tile::<C>(ewa, views, tile, width, pixels);
+            of_tile::<V, C>(token, ewa, views, tile, width, pixels);
         }
         for of_pixel in band.singles.chunk_by(|a, b| a.pixel == b.pixel) {
-            pixels[of_pixel[0].pixel as usize] = of_singles::<C>(ewa, views, of_pixel);
+            pixels[of_pixel[0].pixel as usize] = of_singles::<V, C>(token, ewa, views, of_pixel);
         }
         for &(pixel, coverage) in &band.rim {
             for value in &mut pixels[pixel as usize] {
@@ -43,7 +42,8 @@ impl<const C: usize> NullaryFnOnce for Filtering<'_, C> {
 }
 
 #[inline(always)]
-fn of_tile<const C: usize>(
+fn of_tile<V: Vector, const C: usize>(
+    token: V::Token,
     ewa: &Ewa,
     views: &Views,
     tile: &Tile,
@@ -58,20 +58,31 @@ fn of_tile<const C: usize>(
         let start = ((tile.corner[1] + row) * width + tile.corner[0]) as usize;
         let pixels = &mut pixels[start..start + columns as usize];
         // In x alone: values, and derivatives by y.
-        let [[u, uy], [v, vy]] = tile.texel.map(|c| {
-            let value = |i: usize| y.mul_add(y.mul_add(c[6 + i], c[3 + i]), c[i]);
-            let slope = |i: usize| (2.0 * y).mul_add(c[6 + i], c[3 + i]);
-            [[0, 1, 2].map(value), [0, 1, 2].map(slope)]
-        });
+        let (mut value, mut slope) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
+        for (k, c) in tile.texel.iter().enumerate() {
+            for i in 0..3 {
+                value[k][i] = y.mul_add(y.mul_add(c[6 + i], c[3 + i]), c[i]);
+                slope[k][i] = (2.0 * y).mul_add(c[6 + i], c[3 + i]);
+            }
+        }
+        let [u, v] = value;
         for (chunk, pixels) in pixels.chunks_mut(LANES).enumerate() {
-            let x = Lanes::COUNT + Lanes::all((chunk * LANES) as f32 - middle[0]);
-            let along = |c: &[f32; 3]| x.polynomial(&[c[1], 2.0 * c[2]]);
-            let centre = [x.polynomial(&u), x.polynomial(&v)];
-            let steps = [along(&u), along(&v), x.polynomial(&uy), x.polynomial(&vy)];
-            let footprints = Footprints::new(ewa, ewa.variance, centre, steps);
+            let x = V::count(token) + V::all(token, (chunk * LANES) as f32 - middle[0]);
+            let centre = [x.polynomial(token, &u), x.polynomial(token, &v)];
+            let steps = [
+                x.polynomial(token, &[u[1], 2.0 * u[2]]),
+                x.polynomial(token, &[v[1], 2.0 * v[2]]),
+                x.polynomial(token, &slope[0]),
+                x.polynomial(token, &slope[1]),
+            ];
+            let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps);
+            let [ux, vx, uy, vy] = steps;
+            let arrays = [ux.array(), vx.array(), uy.array(), vy.array()];
             for (lane, pixel) in pixels.iter_mut().enumerate() {
-                let derivatives = steps.map(|step| step.0[lane]);
-                let mean = ewa.of_lane::<C>(levels, tile.base, &footprints, derivatives, lane);
+                let [ux, vx, uy, vy] = &arrays;
+                let derivatives = [ux[lane], vx[lane], uy[lane], vy[lane]];
+                let mean =
+                    ewa.of_lane::<V, C>(token, levels, tile.base, &footprints, derivatives, lane);
                 *pixel = with_opacity(mean);
             }
         }
@@ -80,15 +91,27 @@ fn of_tile<const C: usize>(
 
 /// A pixel from its parts, as the first and differences to it, so that equal parts give just that.
 #[inline(always)]
-fn of_singles<const C: usize>(ewa: &Ewa, views: &Views, singles: &[Single]) -> [f32; 4] {
+fn of_singles<V: Vector, const C: usize>(
+    token: V::Token,
+    ewa: &Ewa,
+    views: &Views,
+    singles: &[Single],
+) -> [f32; 4] {
     let mut result = [0.0; C];
     let mut first = [0.0; C];
     for (index, single) in singles.iter().enumerate() {
-        let centre = single.part.map(Lanes::all);
-        let steps = single.derivatives.map(Lanes::all);
-        let footprints = Footprints::new(ewa, ewa.variance, centre, steps);
+        let centre = single.part.map(|x| V::all(token, x));
+        let steps = single.derivatives.map(|x| V::all(token, x));
+        let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps);
         let levels = views.pyramid(single.view as usize);
-        let mean: [f32; C] = ewa.of_lane(levels, single.base, &footprints, single.derivatives, 0);
+        let mean: [f32; C] = ewa.of_lane::<V, C>(
+            token,
+            levels,
+            single.base,
+            &footprints,
+            single.derivatives,
+            0,
+        );
         if index == 0 {
             (result, first) = (mean, mean);
         } else {
@@ -103,5 +126,7 @@ fn of_singles<const C: usize>(ewa: &Ewa, views: &Views, singles: &[Single]) -> [
 /// RGBA of what has three channels, and is opaque, or four.
 #[inline(always)]
 fn with_opacity<const C: usize>(mean: [f32; C]) -> [f32; 4] {
-    std::array::from_fn(|k| if k < C { mean[k] } else { 1.0 })
+    let mut pixel = [1.0; 4];
+    pixel[..C].copy_from_slice(&mean);
+    pixel
 }

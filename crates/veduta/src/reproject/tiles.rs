@@ -2,7 +2,7 @@
 //! is not.
 
 use super::mapping::{Mapping, Place};
-use crate::filter::ewa::{Ewa, LANES, Lanes, Measuring, vectorized};
+use crate::filter::ewa::{Ewa, LANES, Measuring, vectorized};
 use veduta_geometry::DVec2;
 
 /// Side of the largest tiles, and height of the bands of rows that are made one by one, pixels.
@@ -10,7 +10,7 @@ pub(super) const TILE: u32 = 16;
 
 /// Most that the polynomial of a tile may be off, in texels. Larger would be seen as jumps along tiles in the sharpest
 /// detail; smaller costs more tiles.
-const MOST_ERROR: f64 = 1.0 / 64.0;
+const MOST_ERROR: f64 = 1.0 / 128.0;
 
 /// By which part of themselves derivatives may change over a pixel before it is filtered in parts.
 const MOST_CHANGE: f64 = 0.5;
@@ -70,7 +70,7 @@ pub(super) struct Found {
     pub missing: [f64; 6],
     /// Pixels that the picture covers.
     pub covered: f64,
-    /// Largest reach of a footprint at the finest level, of those that do not use a pyramid, texels.
+    /// Largest reach of a footprint in the level of the pyramid that it uses, texels.
     pub reach: f32,
     /// Largest squared minor radius, texels.
     pub minor: f32,
@@ -244,11 +244,11 @@ impl Cutter<'_> {
         if coverage < 1.0 {
             self.band.rim.push((pixel, coverage as f32));
         }
-        self.band.found.covered += coverage;
         let Some(place) = self.mapping.place(centre) else {
             self.missing(centre, coverage);
             return;
         };
+        self.band.found.covered += coverage;
         self.band.found.pixels[place.view] += coverage;
         let parts = self.parts(centre, &place);
         if parts == 1 {
@@ -358,8 +358,9 @@ impl Cutter<'_> {
 
     /// Notes how large footprints are; gives the largest reach.
     fn measure(&mut self, steps: [[DVec2; 2]; 8]) -> f32 {
-        let lanes =
-            |f: &dyn Fn(&[DVec2; 2]) -> f64| Lanes(std::array::from_fn(|k| f(&steps[k]) as f32));
+        let lanes = |f: &dyn Fn(&[DVec2; 2]) -> f64| -> [f32; LANES] {
+            std::array::from_fn(|k| f(&steps[k]) as f32)
+        };
         let derivatives = [
             lanes(&|[x, _]| x.x),
             lanes(&|[x, _]| x.y),
@@ -371,11 +372,11 @@ impl Cutter<'_> {
         let found = &mut self.band.found;
         let mut reach: f32 = 0.0;
         for lane in 0..LANES {
-            reach = reach.max(reaches.0[lane]);
-            found.minor = found.minor.max(minors.0[lane]);
-            if self.ewa.level(minors.0[lane]) == 0.0 {
-                found.reach = found.reach.max(reaches.0[lane]);
-            }
+            reach = reach.max(reaches[lane]);
+            found.minor = found.minor.max(minors[lane]);
+            // In texels of the finer level that is used.
+            let level = ewa.level(minors[lane]).floor();
+            found.reach = found.reach.max(reaches[lane] * (-level).exp2());
         }
         reach
     }

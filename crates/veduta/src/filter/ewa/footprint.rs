@@ -1,4 +1,4 @@
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Vector};
 use super::{Ewa, Profile};
 
 /// The Gaussian alone above, the sharp profile alone below, of the squared minor radius of a footprint in texels.
@@ -10,21 +10,18 @@ const BLEND: [f32; 2] = [1.5, 3.0];
 #[derive(Clone, Copy)]
 pub(crate) struct Footprints {
     /// Centre, texels from the base; texels' centres are at whole numbers.
-    pub u: Lanes,
-    pub v: Lanes,
-    /// The equation.
-    pub a: Lanes,
-    pub b: Lanes,
-    pub c: Lanes,
+    pub centre: [[f32; LANES]; 2],
+    /// `a`, `b` and `c`.
+    pub equation: [[f32; LANES]; 3],
     /// First column and row inside, and how many there may be, from the base.
     pub first: [[i32; LANES]; 2],
     pub count: [[i32; LANES]; 2],
     /// Share of the sharp profile.
-    pub sharp: Lanes,
+    pub sharp: [f32; LANES],
     /// Largest half extent of the box around, texels.
-    pub reach: Lanes,
+    pub reach: [f32; LANES],
     /// Squared minor radius of the pixel in the texture before anything is added, texels.
-    pub minor: Lanes,
+    pub minor: [f32; LANES],
 }
 
 impl Footprints {
@@ -34,8 +31,15 @@ impl Footprints {
     /// the texels have already (`variance` each, of a radius 1 is 1/4) is subtracted, and they are made 1 at least, so
     /// that there is a texel inside. The paper has neither.
     #[inline(always)]
-    pub fn new(ewa: &Ewa, variance: f32, [u, v]: [Lanes; 2], [ux, vx, uy, vy]: [Lanes; 4]) -> Self {
-        let all = Lanes::all;
+    pub fn new<V: Vector>(
+        token: V::Token,
+        ewa: &Ewa,
+        variance: f32,
+        centre: [V; 2],
+        [ux, vx, uy, vy]: [V; 4],
+    ) -> Self {
+        let all = |value: f32| V::all(token, value);
+        let (zero, one) = (all(0.0), all(1.0));
         let s11 = ux.mul_add(ux, uy * uy);
         let s12 = ux.mul_add(vx, uy * vy);
         let s22 = vx.mul_add(vx, vy * vy);
@@ -44,55 +48,51 @@ impl Footprints {
         let half = (s11 - s22) * all(0.5);
         let spread = half.mul_add(half, s12 * s12).sqrt();
         let major = mean + spread;
-        let minor = (mean - spread).max(all(0.0));
+        let minor = (mean - spread).max(zero);
         let sharp = match ewa.profile {
             Profile::Auto => {
                 let [low, high] = BLEND;
-                ((all(high) - minor) * all(1.0 / (high - low)))
-                    .min(all(1.0))
-                    .max(all(0.0))
+                let share = (all(high) - minor) * all(1.0 / (high - low));
+                share.min(one).max(zero)
             }
-            Profile::Gaussian => all(0.0),
-            _ => all(1.0),
+            Profile::Gaussian => zero,
+            _ => one,
         };
-        let subtracted = (all(1.0) - sharp) * all(4.0 * variance);
-        let one = all(1.0);
+        let subtracted = (one - sharp) * all(4.0 * variance);
         let (n1, n2) = ((major - subtracted).max(one), (minor - subtracted).max(one));
-        // The matrix with these eigenvalues and the same axes.
-        let turn = (n1 - n2).zip(
-            spread,
-            |n, spread| {
-                if spread > 1e-9 { 0.5 * n / spread } else { 0.0 }
-            },
-        );
+        // The matrix with these eigenvalues and the same axes; a circle has no axes.
+        let turn = ((n1 - n2) * all(0.5)).over(spread.max(all(1e-9)));
         let t11 = turn.mul_add(s11 - minor, n2);
         let t12 = turn * s12;
         let t22 = turn.mul_add(s22 - minor, n2);
-        let squared = sharp.map(|sharp| if sharp > 0.0 { 4.0 } else { 1.0 });
-        let scale = (n1 * n2 * squared).recip();
-        let du = (t11 * squared).sqrt();
-        let dv = (t22 * squared).sqrt();
-        let first = |at: Lanes, reach: Lanes| (at - reach).map(|x| x.floor() + 1.0);
-        let (first_u, first_v) = (first(u, du), first(v, dv));
-        let count = |at: Lanes, reach: Lanes, first: Lanes| ((at + reach).map(f32::ceil)) - first;
-        let (count_u, count_v) = (count(u, du, first_u), count(v, dv, first_v));
+        let squared = zero.below(sharp, all(4.0), one);
+        let scale = one.over(n1 * n2 * squared);
+        // No closures from here on: what the compiler does not inline has no vector instructions.
+        let [u, v] = centre;
+        let (du, dv) = ((t11 * squared).sqrt(), (t22 * squared).sqrt());
+        let (first_u, first_v) = ((u - du).floor() + one, (v - dv).floor() + one);
+        let (count_u, count_v) = ((u + du).ceil() - first_u, (v + dv).ceil() - first_v);
+        let (a, b, c) = (t22 * scale, t12 * scale * all(-2.0), t11 * scale);
         Self {
-            u,
-            v,
-            a: t22 * scale,
-            b: t12 * scale * all(-2.0),
-            c: t11 * scale,
+            centre: [u.array(), v.array()],
+            equation: [a.array(), b.array(), c.array()],
             first: [whole(first_u), whole(first_v)],
             count: [whole(count_u), whole(count_v)],
-            sharp,
-            reach: du.max(dv),
-            minor,
+            sharp: sharp.array(),
+            reach: du.max(dv).array(),
+            minor: minor.array(),
         }
     }
 }
 
 /// Lanes of whole numbers as such.
 #[inline(always)]
-fn whole(lanes: Lanes) -> [i32; LANES] {
-    std::array::from_fn(|k| lanes.0[k] as i32)
+fn whole<V: Vector>(lanes: V) -> [i32; LANES] {
+    let lanes = lanes.array();
+    let mut whole = [0; LANES];
+    for (whole, x) in whole.iter_mut().zip(lanes) {
+        // No case for numbers beyond all texels: they are not read.
+        *whole = x as i32;
+    }
+    whole
 }

@@ -1,88 +1,109 @@
-//! Eight numbers at once, in plain code that the compiler turns into vector instructions.
+//! Eight numbers at once.
 //!
-//! Each operation is one of IEEE arithmetic in each lane, and multiplications with additions are fused by name, so that
-//! results are the same whatever instructions they become.
+//! Each operation is one of IEEE arithmetic in each lane, and multiplications with additions are fused, so that results
+//! are the same whether [`Plain`] does them or AVX2 instructions. (Left to itself, the compiler cut the plain lanes into
+//! pairs, which took twice as long as these instructions do.)
 
+use pulp::NullaryFnOnce;
 use std::ops::{Add, Mul, Sub};
 
 /// How many lanes.
 pub(crate) const LANES: usize = 8;
 
 /// Eight `f32`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(32))]
-pub(crate) struct Lanes(pub [f32; LANES]);
+pub(crate) trait Vector:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// Proof that the machine has the instructions.
+    type Token: Copy;
 
-impl Lanes {
-    /// 0, 1, 2 … 7.
-    pub const COUNT: Self = Self([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    /// Eight numbers.
+    fn of(token: Self::Token, lanes: [f32; LANES]) -> Self;
 
-    #[inline(always)]
-    pub fn all(value: f32) -> Self {
-        Self([value; LANES])
-    }
+    /// The lanes' numbers.
+    fn array(self) -> [f32; LANES];
 
-    #[inline(always)]
-    pub fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
-    }
-
-    #[inline(always)]
-    pub fn map(self, f: impl Fn(f32) -> f32) -> Self {
-        Self(std::array::from_fn(|k| f(self.0[k])))
-    }
+    /// Eight times the same.
+    fn all(token: Self::Token, value: f32) -> Self;
 
     /// `self * factor + summand`, rounded once.
-    #[inline(always)]
-    pub fn mul_add(self, factor: Self, summand: Self) -> Self {
-        Self(std::array::from_fn(|k| {
-            self.0[k].mul_add(factor.0[k], summand.0[k])
-        }))
-    }
+    fn mul_add(self, factor: Self, summand: Self) -> Self;
 
-    #[inline(always)]
-    pub fn max(self, other: Self) -> Self {
-        // As one instruction does it; `f32::max` has cases for what is not a number.
-        self.zip(other, |a, b| if a > b { a } else { b })
-    }
+    /// The larger of two; `other` where one is not a number.
+    fn max(self, other: Self) -> Self;
 
-    #[inline(always)]
-    pub fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
+    /// The smaller of two; `other` where one is not a number.
+    fn min(self, other: Self) -> Self;
 
-    #[inline(always)]
-    pub fn sqrt(self) -> Self {
-        self.map(f32::sqrt)
-    }
+    fn sqrt(self) -> Self;
 
-    #[inline(always)]
-    pub fn recip(self) -> Self {
-        self.map(|x| 1.0 / x)
-    }
+    fn over(self, divisor: Self) -> Self;
+
+    fn floor(self) -> Self;
+
+    fn ceil(self) -> Self;
+
+    /// `yes` in lanes below `bound`, `no` in others.
+    fn below(self, bound: Self, yes: Self, no: Self) -> Self;
+
+    /// The sums over the lanes of four: of neighbours, of neighbouring pairs, of both halves.
+    fn sums(of: [Self; 4]) -> [f32; 4];
 
     /// The first of a slice's numbers.
     ///
     /// # Panics
     /// If there are fewer than eight.
     #[inline(always)]
-    pub fn load(from: &[f32]) -> Self {
+    fn load(token: Self::Token, from: &[f32]) -> Self {
         let first: &[f32; LANES] = from.first_chunk().expect("eight numbers");
-        Self(*first)
+        Self::of(token, *first)
+    }
+
+    /// 0, 1, 2 … 7.
+    #[inline(always)]
+    fn count(token: Self::Token) -> Self {
+        Self::of(token, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
     }
 
     /// The polynomial with these coefficients, lowest power first, at the lanes' numbers.
     #[inline(always)]
-    pub fn polynomial<const N: usize>(self, coefficients: &[f32; N]) -> Self {
-        let mut value = Self::all(coefficients[N - 1]);
+    fn polynomial<const N: usize>(self, token: Self::Token, coefficients: &[f32; N]) -> Self {
+        let mut value = Self::all(token, coefficients[N - 1]);
         for k in (0..N - 1).rev() {
-            value = value.mul_add(self, Self::all(coefficients[k]));
+            value = value.mul_add(self, Self::all(token, coefficients[k]));
         }
         value
     }
 }
 
-impl Add for Lanes {
+/// What is done with vectors, whatever they are; `run` is to be inlined.
+pub(crate) trait Work {
+    type Output;
+
+    fn run<V: Vector>(self, token: V::Token) -> Self::Output;
+}
+
+/// Does it with the vector instructions that the machine has.
+pub(crate) fn vectorized<W: Work>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(token) = pulp::x86::V3::try_new() {
+        return token.vectorize(avx2::On { token, work });
+    }
+    work.run::<Plain>(())
+}
+
+/// Lanes in plain code.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain(pub [f32; LANES]);
+
+impl Plain {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    }
+}
+
+impl Add for Plain {
     type Output = Self;
 
     #[inline(always)]
@@ -91,7 +112,7 @@ impl Add for Lanes {
     }
 }
 
-impl Sub for Lanes {
+impl Sub for Plain {
     type Output = Self;
 
     #[inline(always)]
@@ -100,7 +121,7 @@ impl Sub for Lanes {
     }
 }
 
-impl Mul for Lanes {
+impl Mul for Plain {
     type Output = Self;
 
     #[inline(always)]
@@ -109,11 +130,267 @@ impl Mul for Lanes {
     }
 }
 
-/// The sums over the lanes of four, in an order that vector instructions follow.
-#[inline(always)]
-pub(crate) fn sums(of: [Lanes; 4]) -> [f32; 4] {
-    // Halves, then quarters, then the last two.
-    let halves: [[f32; 4]; 4] = of.map(|Lanes(x)| std::array::from_fn(|k| x[k] + x[k + 4]));
-    let quarters = halves.map(|x| [x[0] + x[2], x[1] + x[3]]);
-    quarters.map(|x| x[0] + x[1])
+impl Vector for Plain {
+    type Token = ();
+
+    #[inline(always)]
+    fn of((): (), lanes: [f32; LANES]) -> Self {
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f32; LANES] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn all((): (), value: f32) -> Self {
+        Self([value; LANES])
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
+        let of = |k: usize| self.0[k].mul_add(factor.0[k], summand.0[k]);
+        Self(std::array::from_fn(of))
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f32::sqrt))
+    }
+
+    #[inline(always)]
+    fn over(self, divisor: Self) -> Self {
+        self.zip(divisor, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Self(self.0.map(f32::floor))
+    }
+
+    #[inline(always)]
+    fn ceil(self) -> Self {
+        Self(self.0.map(f32::ceil))
+    }
+
+    #[inline(always)]
+    fn below(self, bound: Self, yes: Self, no: Self) -> Self {
+        let of = |k: usize| {
+            if self.0[k] < bound.0[k] {
+                yes.0[k]
+            } else {
+                no.0[k]
+            }
+        };
+        Self(std::array::from_fn(of))
+    }
+
+    #[inline(always)]
+    fn sums(of: [Self; 4]) -> [f32; 4] {
+        of.map(|Self(x)| ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])))
+    }
+}
+
+/// Lanes in registers of AVX2.
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::{Add, LANES, Mul, NullaryFnOnce, Sub, Vector, Work};
+    use pulp::x86::V3;
+    use pulp::{cast, f32x8};
+
+    /// Work that is to be compiled for these instructions.
+    pub(super) struct On<W> {
+        pub token: V3,
+        pub work: W,
+    }
+
+    impl<W: Work> NullaryFnOnce for On<W> {
+        type Output = W::Output;
+
+        #[inline(always)]
+        fn call(self) -> W::Output {
+            self.work.run::<Avx2>(self.token)
+        }
+    }
+
+    #[derive(Clone, Copy)]
+    pub(super) struct Avx2 {
+        token: V3,
+        lanes: f32x8,
+    }
+
+    impl Avx2 {
+        #[inline(always)]
+        fn with(self, lanes: f32x8) -> Self {
+            Self { lanes, ..self }
+        }
+    }
+
+    impl Add for Avx2 {
+        type Output = Self;
+
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            self.with(self.token.add_f32x8(self.lanes, other.lanes))
+        }
+    }
+
+    impl Sub for Avx2 {
+        type Output = Self;
+
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            self.with(self.token.sub_f32x8(self.lanes, other.lanes))
+        }
+    }
+
+    impl Mul for Avx2 {
+        type Output = Self;
+
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            self.with(self.token.mul_f32x8(self.lanes, other.lanes))
+        }
+    }
+
+    impl Vector for Avx2 {
+        type Token = V3;
+
+        #[inline(always)]
+        fn of(token: V3, lanes: [f32; LANES]) -> Self {
+            let lanes = cast(lanes);
+            Self { token, lanes }
+        }
+
+        #[inline(always)]
+        fn array(self) -> [f32; LANES] {
+            cast(self.lanes)
+        }
+
+        #[inline(always)]
+        fn all(token: V3, value: f32) -> Self {
+            let lanes = token.splat_f32x8(value);
+            Self { token, lanes }
+        }
+
+        #[inline(always)]
+        fn mul_add(self, factor: Self, summand: Self) -> Self {
+            let Self { token, lanes } = self;
+            self.with(token.mul_add_f32x8(lanes, factor.lanes, summand.lanes))
+        }
+
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            let Self { token, lanes } = self;
+            self.with(cast(
+                token.avx._mm256_max_ps(cast(lanes), cast(other.lanes)),
+            ))
+        }
+
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            let Self { token, lanes } = self;
+            self.with(cast(
+                token.avx._mm256_min_ps(cast(lanes), cast(other.lanes)),
+            ))
+        }
+
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            self.with(self.token.sqrt_f32x8(self.lanes))
+        }
+
+        #[inline(always)]
+        fn over(self, divisor: Self) -> Self {
+            self.with(self.token.div_f32x8(self.lanes, divisor.lanes))
+        }
+
+        #[inline(always)]
+        fn floor(self) -> Self {
+            self.with(cast(self.token.avx._mm256_floor_ps(cast(self.lanes))))
+        }
+
+        #[inline(always)]
+        fn ceil(self) -> Self {
+            self.with(cast(self.token.avx._mm256_ceil_ps(cast(self.lanes))))
+        }
+
+        #[inline(always)]
+        fn below(self, bound: Self, yes: Self, no: Self) -> Self {
+            let Self { token, lanes } = self;
+            let mask = token.cmp_lt_f32x8(lanes, bound.lanes);
+            self.with(token.select_f32x8(mask, yes.lanes, no.lanes))
+        }
+
+        #[inline(always)]
+        fn sums([a, b, c, d]: [Self; 4]) -> [f32; 4] {
+            let avx = a.token.avx;
+            let pairs = |a: Self, b: Self| avx._mm256_hadd_ps(cast(a.lanes), cast(b.lanes));
+            let quarters: [f32; LANES] = cast(avx._mm256_hadd_ps(pairs(a, b), pairs(c, d)));
+            let [a, b, c, d, e, f, g, h] = quarters;
+            [a + e, b + f, c + g, d + h]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every operation on numbers of all kinds.
+    struct All([f32; LANES], [f32; LANES]);
+
+    impl Work for All {
+        type Output = Vec<[u32; LANES]>;
+
+        #[inline(always)]
+        fn run<V: Vector>(self, token: V::Token) -> Self::Output {
+            let (a, b) = (V::of(token, self.0), V::load(token, &self.1));
+            let sums = V::sums([a, b, a * b, a - b]);
+            let sums = std::array::from_fn(|k| sums[k % 4]);
+            let results = [
+                a + b,
+                a.mul_add(b, a),
+                a.max(b),
+                a.min(b),
+                a.sqrt(),
+                a.over(b),
+                a.floor(),
+                b.ceil(),
+                a.below(b, V::count(token), V::all(token, 2.5)),
+                b.polynomial(token, &[0.3, -1.7, 0.1]),
+                V::of(token, sums),
+            ];
+            results.map(|v| v.array().map(f32::to_bits)).to_vec()
+        }
+    }
+
+    #[test]
+    fn instructions_and_plain_code_give_the_same_bits() {
+        let mut seed = 1_u32;
+        let mut any = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / 65_536.0 - 40.0
+        };
+        for _ in 0..1000 {
+            let a = std::array::from_fn(|_| any().abs());
+            let b = std::array::from_fn(|_| any());
+            assert_eq!(
+                vectorized(All(a, b)),
+                All(a, b).run::<Plain>(()),
+                "{a:?} {b:?}"
+            );
+        }
+    }
 }

@@ -25,11 +25,10 @@ mod scan;
 pub use profile::Profile;
 
 pub(crate) use footprint::Footprints;
-pub(crate) use lanes::{LANES, Lanes};
+pub(crate) use lanes::{LANES, Vector, Work, vectorized};
 pub(crate) use scan::mean;
 
 use super::Planes;
-use pulp::{Arch, NullaryFnOnce};
 
 /// How the elliptical filter filters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,8 +89,9 @@ impl Ewa {
 
     /// The mean of one of eight footprints, whose derivatives are told again.
     #[inline(always)]
-    pub(crate) fn of_lane<const C: usize>(
+    pub(crate) fn of_lane<V: Vector, const C: usize>(
         &self,
+        token: V::Token,
         levels: &[Planes],
         base: [i32; 2],
         footprints: &Footprints,
@@ -99,13 +99,13 @@ impl Ewa {
         lane: usize,
     ) -> [f32; C] {
         let planes = &levels[0];
-        let near = footprints.reach.0[lane] <= planes.apron() as f32 - MARGIN;
-        let small = footprints.minor.0[lane] <= self.most_squared();
+        let near = footprints.reach[lane] <= planes.apron() as f32 - MARGIN;
+        let small = footprints.minor[lane] <= self.most_squared();
         if near && small {
-            return mean(self, planes, base, footprints, lane);
+            return mean::<V, C>(token, self, planes, base, footprints, lane);
         }
-        let part = [footprints.u.0[lane], footprints.v.0[lane]];
-        self.large(levels, base, part, derivatives)
+        let part = footprints.centre.map(|centre| centre[lane]);
+        self.large::<V, C>(token, levels, base, part, derivatives)
     }
 
     /// Squared minor radius above which a pyramid is used.
@@ -127,8 +127,9 @@ impl Ewa {
 
     /// A footprint that is too large for the finest level or its apron.
     #[inline(always)]
-    fn large<const C: usize>(
+    fn large<V: Vector, const C: usize>(
         &self,
+        token: V::Token,
         levels: &[Planes],
         base: [i32; 2],
         part: [f32; 2],
@@ -150,7 +151,8 @@ impl Ewa {
         let count = if share > 0.0 { 2 } else { 1 };
         let mut result = [0.0; C];
         for index in 0..count {
-            let mean: [f32; C] = self.at_level(levels, finer + index, centre, derivatives);
+            let mean: [f32; C] =
+                self.at_level::<V, C>(token, levels, finer + index, centre, derivatives);
             // The second by its difference to the first, so that equal values stay what they are.
             let part = if index == 0 { 1.0 } else { share };
             result = std::array::from_fn(|k| part.mul_add(mean[k] - result[k], result[k]));
@@ -160,8 +162,9 @@ impl Ewa {
 
     /// The mean at one level, or at the first coarser one in which the footprint stays within the apron.
     #[inline(always)]
-    fn at_level<const C: usize>(
+    fn at_level<V: Vector, const C: usize>(
         &self,
+        token: V::Token,
         levels: &[Planes],
         level: usize,
         centre: [f64; 2],
@@ -173,12 +176,13 @@ impl Ewa {
             let scale = 1.0 / f64::from(1_u32 << level);
             let centre = centre.map(|x| (x + 0.5) * scale - 0.5);
             let base = centre.map(f64::floor);
-            let part = [0, 1].map(|k| Lanes::all((centre[k] - base[k]) as f32));
+            let part = [0, 1].map(|k| V::all(token, (centre[k] - base[k]) as f32));
             let variance = (0..level).fold(self.variance, |finer, _| 0.25 * (finer + 0.75));
             let limit = planes.apron() as f32 - MARGIN;
             let mut scaled = derivatives.map(|d| d * scale as f32);
-            let mut footprints = Footprints::new(self, variance, part, scaled.map(Lanes::all));
-            let reach = footprints.reach.0[0];
+            let all = |derivatives: [f32; 4]| derivatives.map(|d| V::all(token, d));
+            let mut footprints = Footprints::new(token, self, variance, part, all(scaled));
+            let reach = footprints.reach[0];
             if reach > limit && planes.repeats() {
                 return plain::around(self, planes, centre, &footprints);
             }
@@ -189,9 +193,10 @@ impl Ewa {
             if reach > limit {
                 // Larger than all there is, at the coarsest level: what the apron shows of it.
                 scaled = scaled.map(|d| d * (limit / reach));
-                footprints = Footprints::new(self, variance, part, scaled.map(Lanes::all));
+                footprints = Footprints::new(token, self, variance, part, all(scaled));
             }
-            return mean(self, planes, base.map(|x| x as i32), &footprints, 0);
+            let base = base.map(|x| x as i32);
+            return mean::<V, C>(token, self, planes, base, &footprints, 0);
         }
     }
 }
@@ -205,30 +210,33 @@ struct Sampling<'a, const C: usize> {
     derivatives: [f32; 4],
 }
 
-impl<const C: usize> NullaryFnOnce for Sampling<'_, C> {
+impl<const C: usize> Work for Sampling<'_, C> {
     type Output = [f32; C];
 
     #[inline(always)]
-    fn call(self) -> [f32; C] {
-        let (ewa, steps) = (self.ewa, self.derivatives.map(Lanes::all));
-        let footprints = Footprints::new(ewa, ewa.variance, self.part.map(Lanes::all), steps);
-        ewa.of_lane(self.levels, self.base, &footprints, self.derivatives, 0)
+    fn run<V: Vector>(self, token: V::Token) -> [f32; C] {
+        let all = |value: f32| V::all(token, value);
+        let (ewa, steps) = (self.ewa, self.derivatives);
+        let centre = self.part.map(all);
+        let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps.map(all));
+        ewa.of_lane::<V, C>(token, self.levels, self.base, &footprints, steps, 0)
     }
 }
 
 /// Of footprints with these derivatives, the largest half extent and the squared minor radius of each, texels.
 pub(crate) struct Measuring<'a> {
     pub ewa: &'a Ewa,
-    pub derivatives: [Lanes; 4],
+    pub derivatives: [[f32; LANES]; 4],
 }
 
-impl NullaryFnOnce for Measuring<'_> {
-    type Output = [Lanes; 2];
+impl Work for Measuring<'_> {
+    type Output = [[f32; LANES]; 2];
 
     #[inline(always)]
-    fn call(self) -> [Lanes; 2] {
-        let centre = [Lanes::all(0.0); 2];
-        let of = Footprints::new(self.ewa, self.ewa.variance, centre, self.derivatives);
+    fn run<V: Vector>(self, token: V::Token) -> Self::Output {
+        let centre = [V::all(token, 0.0); 2];
+        let steps = self.derivatives.map(|lanes| V::of(token, lanes));
+        let of = Footprints::new(token, self.ewa, self.ewa.variance, centre, steps);
         [of.reach, of.minor]
     }
 }
@@ -238,9 +246,4 @@ pub(crate) fn minor_squared([ux, vx, uy, vy]: [f32; 4]) -> f32 {
     let (s11, s12, s22) = (ux * ux + uy * uy, ux * vx + uy * vy, vx * vx + vy * vy);
     let half = 0.5 * (s11 - s22);
     (0.5 * (s11 + s22) - (half * half + s12 * s12).sqrt()).max(0.0)
-}
-
-/// Runs `work`, whose `call` is to be inlined, with the vector instructions that the machine has.
-pub(crate) fn vectorized<W: NullaryFnOnce>(work: W) -> W::Output {
-    Arch::new().dispatch(work)
 }

@@ -1,8 +1,9 @@
 //! The scan as the paper prints it: row by row over the box around the ellipse, with differences of its equation, and a
 //! table of weights. The reference for the quick scan, and what filters footprints that wrap far around.
 
+use super::lanes::{Plain, Vector};
 use super::profile::{Gaussian, Mixture, Round, Weigh};
-use super::{Ewa, Footprints, Lanes, Profile};
+use super::{Ewa, Footprints, Profile};
 use crate::filter::Planes;
 use std::sync::OnceLock;
 
@@ -46,7 +47,7 @@ pub fn weights(profile: Profile, sharp: f32) -> impl Fn(f64) -> f64 {
     static MITCHELL: OnceLock<WeightTable> = OnceLock::new();
     fn table(cell: &'static OnceLock<WeightTable>, weigh: impl Weigh) -> &'static WeightTable {
         // Up to the end, where a Gaussian falls to 0 at once.
-        let weight = |q: f32| weigh.weights(Lanes::all(q.min(1.0 - 1e-6))).0[0];
+        let weight = |q: f32| weigh.weights((), Plain::all((), q.min(1.0 - 1e-6))).0[0];
         cell.get_or_init(|| WeightTable::new(weight))
     }
     let round = match profile {
@@ -117,9 +118,9 @@ pub(super) fn around<const C: usize>(
     centre: [f64; 2],
     footprints: &Footprints,
 ) -> [f32; C] {
-    let equation = [footprints.a, footprints.b, footprints.c].map(|lanes| f64::from(lanes.0[0]));
+    let equation = footprints.equation.map(|lanes| f64::from(lanes[0]));
     let ellipse = Ellipse { centre, equation };
-    let weights = weights(ewa.profile, footprints.sharp.0[0]);
+    let weights = weights(ewa.profile, footprints.sharp[0]);
     let (width, rows) = (planes.width() as i32, planes.rows());
     let texel = |column: i32, row: i32| {
         let row = row.clamp(rows.start, rows.end - 1);

@@ -1,4 +1,4 @@
-use super::lanes::Lanes;
+use super::lanes::Vector;
 
 /// How an elliptical filter weighs texels, from its centre outwards.
 ///
@@ -26,7 +26,7 @@ pub(crate) trait Weigh: Copy {
     const RADIUS_SQUARED: f32;
 
     /// Weights of eight texels; 0 from q = 1 on.
-    fn weights(&self, q: Lanes) -> Lanes;
+    fn weights<V: Vector>(&self, token: V::Token, q: V) -> V;
 }
 
 /// `exp(-2 q)` to 2e-5, as a polynomial.
@@ -50,15 +50,15 @@ impl Weigh for Gaussian {
     const RADIUS_SQUARED: f32 = 1.0;
 
     #[inline(always)]
-    fn weights(&self, q: Lanes) -> Lanes {
-        gaussian(q)
+    fn weights<V: Vector>(&self, token: V::Token, q: V) -> V {
+        gaussian(token, q)
     }
 }
 
 #[inline(always)]
-fn gaussian(q: Lanes) -> Lanes {
-    let bell = q.polynomial(&GAUSSIAN);
-    bell.zip(q, |bell, q| if q < 1.0 { bell } else { 0.0 })
+fn gaussian<V: Vector>(token: V::Token, q: V) -> V {
+    let bell = q.polynomial(token, &GAUSSIAN);
+    q.below(V::all(token, 1.0), bell, V::all(token, 0.0))
 }
 
 /// A profile of radius 2: `(1 - q)^2` times a polynomial of q, so that it ends without an edge.
@@ -71,9 +71,9 @@ impl Weigh for Round {
     const RADIUS_SQUARED: f32 = 4.0;
 
     #[inline(always)]
-    fn weights(&self, q: Lanes) -> Lanes {
-        let inside = (Lanes::all(1.0) - q).max(Lanes::all(0.0));
-        q.polynomial(&self.coefficients) * (inside * inside)
+    fn weights<V: Vector>(&self, token: V::Token, q: V) -> V {
+        let inside = (V::all(token, 1.0) - q).max(V::all(token, 0.0));
+        q.polynomial(token, &self.coefficients) * (inside * inside)
     }
 }
 
@@ -136,9 +136,9 @@ impl Weigh for Mixture {
     const RADIUS_SQUARED: f32 = Round::RADIUS_SQUARED;
 
     #[inline(always)]
-    fn weights(&self, q: Lanes) -> Lanes {
-        let sharp = Round::SHARP.weights(q) * Lanes::all(self.sharp);
-        let near = gaussian(q * Lanes::all(Self::RADIUS_SQUARED));
-        near.mul_add(Lanes::all(self.gaussian), sharp)
+    fn weights<V: Vector>(&self, token: V::Token, q: V) -> V {
+        let sharp = Round::SHARP.weights(token, q) * V::all(token, self.sharp);
+        let near = gaussian(token, q * V::all(token, Self::RADIUS_SQUARED));
+        near.mul_add(V::all(token, self.gaussian), sharp)
     }
 }

@@ -1,5 +1,5 @@
 use super::footprint::Footprints;
-use super::lanes::{LANES, Lanes, sums};
+use super::lanes::{LANES, Vector};
 use super::profile::{Gaussian, Mixture, Round, Weigh};
 use super::{Ewa, Profile};
 use crate::filter::Planes;
@@ -8,58 +8,65 @@ use crate::filter::Planes;
 ///
 /// The box around it, enlarged to whole vectors, must lie within the planes and their apron.
 #[inline(always)]
-pub(crate) fn mean<const C: usize>(
+pub(crate) fn mean<V: Vector, const C: usize>(
+    token: V::Token,
     ewa: &Ewa,
     planes: &Planes,
     base: [i32; 2],
     footprints: &Footprints,
     lane: usize,
 ) -> [f32; C] {
-    let sharp = footprints.sharp.0[lane];
+    let sharp = footprints.sharp[lane];
     if sharp <= 0.0 {
-        return scan(&Gaussian, planes, base, footprints, lane);
+        return scan::<V, _, C>(token, &Gaussian, planes, base, footprints, lane);
     }
     if sharp < 1.0 {
-        return scan(&Mixture::new(sharp), planes, base, footprints, lane);
+        return scan::<V, _, C>(token, &Mixture::new(sharp), planes, base, footprints, lane);
     }
     let round = match ewa.profile {
         Profile::Robidoux => &Round::ROBIDOUX,
         Profile::Mitchell => &Round::MITCHELL,
         _ => &Round::SHARP,
     };
-    scan(round, planes, base, footprints, lane)
+    scan::<V, _, C>(token, round, planes, base, footprints, lane)
 }
 
 #[inline(always)]
-fn scan<W: Weigh, const C: usize>(
+fn scan<V: Vector, W: Weigh, const C: usize>(
+    token: V::Token,
     weigh: &W,
     planes: &Planes,
     base: [i32; 2],
     of: &Footprints,
     lane: usize,
 ) -> [f32; C] {
-    let (u, v) = (of.u.0[lane], of.v.0[lane]);
-    let (a, b, c) = (of.a.0[lane], of.b.0[lane], of.c.0[lane]);
-    let [first_column, first_row] = of.first.map(|first| first[lane]);
-    let [columns, rows] = of.count.map(|count| count[lane]);
+    let (u, v) = (of.centre[0][lane], of.centre[1][lane]);
+    let (a, b, c) = (
+        of.equation[0][lane],
+        of.equation[1][lane],
+        of.equation[2][lane],
+    );
+    let all = |value: f32| V::all(token, value);
+    let (first_column, first_row) = (of.first[0][lane], of.first[1][lane]);
+    let (columns, rows) = (of.count[0][lane], of.count[1][lane]);
     let (stride, pitch) = (planes.stride(), planes.stride() * planes.channels());
     let corner = planes
         .start(base[1] + first_row)
         .wrapping_add_signed((base[0] + first_column) as isize);
-    let (mut sum, mut weight) = ([Lanes::all(0.0); C], Lanes::all(0.0));
+    let (mut sum, mut weight) = ([all(0.0); C], all(0.0));
     let mut done = 0;
     while done < columns {
-        let across = Lanes::COUNT + Lanes::all((first_column + done) as f32 - u);
-        let (square, product) = (across * across * Lanes::all(a), across * Lanes::all(b));
+        let across = V::count(token) + all((first_column + done) as f32 - u);
+        let (square, product) = (across * across * all(a), across * all(b));
         let mut at = corner + done as usize;
         let mut down = first_row as f32 - v;
         for _ in 0..rows {
             // a U^2 + V (b U + c V).
-            let q = (product + Lanes::all(c * down)).mul_add(Lanes::all(down), square);
-            let weights = weigh.weights(q);
+            let q = (product + all(c * down)).mul_add(all(down), square);
+            let weights = weigh.weights(token, q);
             weight = weight + weights;
             for (channel, sum) in sum.iter_mut().enumerate() {
-                let texels = Lanes::load(&planes.samples()[at + channel * stride..]);
+                let texels = V::load(token, &planes.samples()[at + channel * stride..]);
                 *sum = weights.mul_add(texels, *sum);
             }
             at += pitch;
@@ -67,18 +74,40 @@ fn scan<W: Weigh, const C: usize>(
         }
         done += LANES as i32;
     }
-    finish(&sum, weight)
+    let mut mean: [f32; C] = quotients(token, &sum, weight);
+    // Equal texels shall give just that value, which rounded sums do not.
+    let middle = planes
+        .start(base[1] + v.round() as i32)
+        .wrapping_add_signed((base[0] + u.round() as i32) as isize);
+    for (channel, mean) in mean.iter_mut().enumerate() {
+        let texel = planes.samples()[middle + channel * stride];
+        if (*mean - texel).abs() <= ROUNDING * texel.abs() {
+            *mean = texel;
+        }
+    }
+    mean
 }
 
+/// What rounding may add to a mean of a hundred texels, relative; a mean nearer than this to the texel in its middle is
+/// taken to be that texel.
+const ROUNDING: f32 = 1e-6;
+
 #[inline(always)]
-fn finish<const C: usize>(sum: &[Lanes; C], weight: Lanes) -> [f32; C] {
-    let zero = Lanes::all(0.0);
-    let of = |k: usize| if k < C { sum[k] } else { zero };
-    if C <= 3 {
-        let [x, y, z, weight] = sums([of(0), of(1), of(2), weight]);
-        return std::array::from_fn(|k| [x, y, z][k] / weight);
+fn quotients<V: Vector, const C: usize>(token: V::Token, sum: &[V; C], weight: V) -> [f32; C] {
+    let mut four = [V::all(token, 0.0); 4];
+    let weight = if C <= 3 {
+        four[..C].copy_from_slice(sum);
+        four[3] = weight;
+        None
+    } else {
+        four.copy_from_slice(&sum[..4]);
+        Some(V::sums([weight, weight, weight, weight])[0])
+    };
+    let totals = V::sums(four);
+    let inverse = 1.0 / weight.unwrap_or(totals[3]);
+    let mut means = [0.0; C];
+    for (mean, total) in means.iter_mut().zip(totals) {
+        *mean = total * inverse;
     }
-    let totals = sums([of(0), of(1), of(2), of(3)]);
-    let [weight, ..] = sums([weight, zero, zero, zero]);
-    std::array::from_fn(|k| totals[k] / weight)
+    means
 }
