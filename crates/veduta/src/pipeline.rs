@@ -1,6 +1,7 @@
 //! The order of the stages: the only file that knows it, with `pipeline/aovs.rs` for channels beside
 //! the light, `pipeline/deep.rs` for deep pictures, `pipeline/filtered.rs` for filters that reach beyond
-//! the pixel, `pipeline/frames.rs` for animations, `pipeline/local.rs` for parts of pictures, and
+//! the pixel, `pipeline/frames.rs` for animations, `pipeline/lens.rs` for domes and panoramas,
+//! `pipeline/local.rs` for parts of pictures, and
 //! `pipeline/guests.rs` and `pipeline/mattes.rs` for what is only in composites.
 
 mod aovs;
@@ -8,11 +9,16 @@ mod deep;
 mod filtered;
 mod frames;
 mod guests;
+mod lens;
 mod local;
 mod mattes;
 
 pub use deep::{deep_window, render_deep};
 pub use frames::{Extent, FrameStep, FrameWork, Frames};
+pub use lens::{
+    SeenView, Surroundings, find_surroundings, lens_coverage, render_cube, render_filtered,
+    render_surroundings,
+};
 pub use local::render_region;
 
 use crate::accumulate::{self, AovSettings, Aovs, Picture};
@@ -111,6 +117,15 @@ pub enum Step {
     Projecting,
     /// What is seen is found.
     FindingVisibility,
+    /// What a lens looks at is found out.
+    FollowingLens,
+    /// What is seen in a part of a face of the cube around the eye is found.
+    View {
+        /// Parts done before.
+        index: usize,
+        /// All parts.
+        count: usize,
+    },
     /// What is seen is made to pixels.
     Shading,
     /// A strip of a picture with more faces than pixels is found and made to pixels.

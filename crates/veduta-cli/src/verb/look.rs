@@ -125,9 +125,14 @@ impl Look {
         Err(Failure::new(Code::Usage, message))
     }
 
+    /// Whether pixels are weighed by area.
+    pub fn is_by_area(&self) -> bool {
+        self.filter == FilterArgument::Box
+    }
+
     /// Fails if a filter is asked for that has no meaning for what is made, and tells why.
     pub fn refuse_filter(&self, why: &str) -> Result<(), Failure> {
-        if self.filter == FilterArgument::Box {
+        if self.is_by_area() {
             return Ok(());
         }
         let message = format!("{why}; leave --filter out");

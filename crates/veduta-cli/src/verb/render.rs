@@ -1,3 +1,5 @@
+mod lens;
+
 use super::deep::DeepTarget;
 use super::look::Look;
 use super::output::{Output, Target};
@@ -67,6 +69,8 @@ pub struct Render {
     #[command(flatten)]
     view: View,
     #[command(flatten)]
+    lens: lens::LensOptions,
+    #[command(flatten)]
     when: When,
     #[command(flatten)]
     look: Look,
@@ -97,6 +101,9 @@ Examples:
   What is seen, kept for any number of pictures; and with all that is not seen, for shadows:
       veduta render town.obj -o kept.veduta
       veduta render town.obj -o whole.veduta --self-contained
+  A dome for a planetarium from a street, and all around as a panorama:
+      veduta render town.obj --lens domemaster --eye 12,-8,1.7 --look-at 12,30,1.7 -o dome.png
+      veduta render town.obj --lens equirect --eye 12,-8,1.7 --size 4096x2048 -o around.png
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -140,6 +147,9 @@ impl Render {
 
     pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         self.look.refuse_background_map()?;
+        if let Some(lens) = self.lens.lens {
+            return self.render_by_lens(lens, json, talk);
+        }
         if let Some(target) = self.output.vector_target(&self.model, json)? {
             self.refuse_self_contained()?;
             return self.draw(&target, json, talk);
@@ -461,6 +471,13 @@ pub(super) fn tell_step(step: Step, talk: &mut Talk) {
     match step {
         Step::Projecting => talk.begin("projecting"),
         Step::FindingVisibility => talk.begin("finding visibility"),
+        Step::FollowingLens => talk.begin("following the lens"),
+        Step::View { index, count } => {
+            if index == 0 {
+                talk.begin("finding visibility");
+            }
+            talk.part(index, count);
+        }
         Step::Shading => talk.begin("shading"),
         Step::Strip { index, count } => {
             if index == 0 {
@@ -521,7 +538,7 @@ impl View {
             return Err(Failure::new(Code::BadInput, message));
         };
         let mut camera = match self.eye {
-            Some(eye) => self.explicit(eye, &bounds, aspect)?,
+            Some(eye) => self.explicit(eye, self.look_at, &bounds, aspect)?,
             None => match name {
                 None => self.framing(scene, &bounds, aspect)?,
                 Some(name) => self.named(model, scene, name, aspect)?,
@@ -557,9 +574,15 @@ impl View {
         }
     }
 
-    fn explicit(&self, eye: DVec3, bounds: &Bounds, aspect: f64) -> Result<Camera, Failure> {
+    fn explicit(
+        &self,
+        eye: DVec3,
+        look_at: Option<DVec3>,
+        bounds: &Bounds,
+        aspect: f64,
+    ) -> Result<Camera, Failure> {
         let middle = 0.5 * (bounds.min + bounds.max);
-        let look_at = self.look_at.unwrap_or(middle);
+        let look_at = look_at.unwrap_or(middle);
         let projection = self.projection(FRAMING_FOV, aspect);
         let near = match projection {
             Projection::Perspective { .. } => {

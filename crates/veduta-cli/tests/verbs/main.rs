@@ -11,6 +11,7 @@ mod filters;
 mod frames;
 mod help;
 mod info;
+mod lens;
 mod pictures;
 mod pipes;
 mod preview;

@@ -43,15 +43,20 @@ pub fn box_filter(
 ) {
     sums.clear();
     sums.resize(pixels.len(), [0.0; 4]);
+    add_parts(parts, radiance, sums);
+    for (pixel, sum) in pixels.iter_mut().zip(sums) {
+        *pixel = sum.map(|channel| channel as f32);
+    }
+}
+
+/// Adds a band's parts to `sums`, one for each of its pixels: RGBA as in a [`Picture`].
+pub fn add_parts(parts: &Parts, radiance: &Radiance, sums: &mut [[f64; 4]]) {
     for (part, &[r, g, b]) in parts.boundary.iter().zip(&radiance.boundary) {
         let area = f64::from(part.area);
         let value = [r, g, b, 1.0].map(|channel| area * f64::from(channel));
         add(&mut sums[part.pixel as usize], value);
     }
     add_runs(parts, radiance, sums);
-    for (pixel, sum) in pixels.iter_mut().zip(sums) {
-        *pixel = sum.map(|channel| channel as f32);
-    }
 }
 
 /// Adds to each pixel what fills it.

@@ -17,6 +17,9 @@
 //!
 //! [`GuestDicer`] does that where pictures of other programs are seen too, whose samples have depths.
 //!
+//! Where a picture is made of patches, each a small perspective picture of its own (domes, panoramas),
+//! [`PatchDicer`] does the same.
+//!
 //! For filters that reach beyond a pixel the same is done on cells around it, with all moments of parts instead
 //! of areas ([`CellParts`], [`PixelGrid::between_centres`]).
 //!
@@ -29,6 +32,7 @@ mod coverage;
 mod depth;
 mod guests;
 mod measure;
+mod patched;
 mod pixel_grid;
 mod place;
 mod region;
@@ -42,6 +46,9 @@ pub use coverage::{Coverage, coverage};
 pub use depth::{DepthRange, Depths, depth_of_nearness};
 pub use guests::{GuestBuffers, GuestDicer, GuestLight};
 pub use measure::{CellParts, Diced, Measure};
+pub use patched::{
+    PatchDicer, PatchedBand, PatchedParts, PatchedView, attenuate_patched, patched_coverage,
+};
 pub use pixel_grid::PixelGrid;
 pub use region::Region;
 pub use shares::{Share, largest, sum_by_face};

@@ -49,9 +49,14 @@ impl PixelClip {
     ) -> &[DVec2] {
         let polygon = map.polygon(map.fragment(fragment as usize));
         // From the pixel's corner: clipping at 0 and 1 is exact there.
-        self.polygon.clear();
         let placed = polygon.iter().map(|&p| grid.pixels_from_image(p) - pixel);
-        self.polygon.extend(placed);
+        self.clip_placed(placed)
+    }
+
+    /// What of a convex polygon lies in the unit square.
+    pub fn clip_placed(&mut self, polygon: impl Iterator<Item = DVec2>) -> &[DVec2] {
+        self.polygon.clear();
+        self.polygon.extend(polygon);
         for (axis, border, sign) in [(0, 0.0, 1.0), (0, 1.0, -1.0), (1, 0.0, 1.0), (1, 1.0, -1.0)] {
             clip_axis(&self.polygon, axis, border, sign, &mut self.clipped);
             std::mem::swap(&mut self.polygon, &mut self.clipped);

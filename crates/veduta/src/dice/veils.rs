@@ -41,8 +41,6 @@ const QUARTERINGS: u32 = 5;
 #[derive(Clone, Debug, Default)]
 pub struct VeilBuffers<M = f64> {
     veiled: Vec<bool>,
-    /// `(pixel, part)` of the parts in pixels with veils.
-    entries: Vec<(u32, u32)>,
     layers: Vec<Layer<M>>,
     /// Corners of the layers' polygons, from the pixel's corner.
     points: Vec<DVec2>,
@@ -78,6 +76,53 @@ impl<M> Layer<M> {
     }
 }
 
+/// Where the parts of a band lie.
+pub(super) trait Ground {
+    /// A region of a pixel, in which surfaces have an order of their own.
+    type Place: Copy + Ord;
+
+    /// Where a part lies, by its place in [`Parts::boundary`](super::Parts::boundary).
+    fn place_of(&self, part: usize, pixel: u32) -> Self::Place;
+
+    /// What of a fragment lies there, measured from the pixel's top left corner.
+    fn clip<'b>(&self, place: Self::Place, fragment: u32, clip: &'b mut PixelClip) -> &'b [DVec2];
+
+    /// Nearness there as a function of pixel coordinates from that corner, up to a factor that is positive
+    /// and the same for all.
+    fn nearness(&self, place: Self::Place, plane: &Affine) -> Affine;
+}
+
+/// A band of a pixel grid that lies on the image plane of a map.
+struct BandOfGrid<'a> {
+    map: &'a VisibilityMap,
+    grid: &'a PixelGrid,
+    first_row: u32,
+}
+
+impl BandOfGrid<'_> {
+    /// Top left corner of a pixel in the grid.
+    fn corner(&self, pixel: u32) -> DVec2 {
+        let row = self.first_row + pixel / self.grid.width;
+        DVec2::new(f64::from(pixel % self.grid.width), f64::from(row))
+    }
+}
+
+impl Ground for BandOfGrid<'_> {
+    type Place = u32;
+
+    fn place_of(&self, _part: usize, pixel: u32) -> u32 {
+        pixel
+    }
+
+    fn clip<'b>(&self, pixel: u32, fragment: u32, clip: &'b mut PixelClip) -> &'b [DVec2] {
+        clip.clip(self.map, self.grid, fragment, self.corner(pixel))
+    }
+
+    fn nearness(&self, pixel: u32, plane: &Affine) -> Affine {
+        self.grid.affine_in_pixels(plane, self.corner(pixel))
+    }
+}
+
 /// Makes of each part's area, or moments, those of what is seen of it: see
 /// [`Part::area`](super::Part::area).
 ///
@@ -91,59 +136,73 @@ pub fn attenuate<D: Diced>(
     buffers: &mut VeilBuffers<D::Measure>,
     diced: &mut D,
 ) {
+    let ground = BandOfGrid {
+        map,
+        grid,
+        first_row,
+    };
+    attenuate_on(&ground, map, opacities, buffers, diced);
+}
+
+/// [`attenuate`] for parts that lie on any ground.
+pub(super) fn attenuate_on<G: Ground, D: Diced>(
+    ground: &G,
+    map: &VisibilityMap,
+    opacities: &[f32],
+    buffers: &mut VeilBuffers<D::Measure>,
+    diced: &mut D,
+) {
     let boundary = &diced.parts().boundary;
     let first_veil = boundary.len() - opacities.len();
     let Some(last) = boundary[first_veil..].iter().map(|p| p.pixel).max() else {
         return;
     };
-    let VeilBuffers {
-        veiled, entries, ..
-    } = buffers;
+    let veiled = &mut buffers.veiled;
     veiled.clear();
     veiled.resize(last as usize + 1, false);
     for part in &boundary[first_veil..] {
         veiled[part.pixel as usize] = true;
     }
-    entries.clear();
-    let rows = boundary.iter().zip(0..);
+    let rows = boundary.iter().enumerate();
     let is_veiled = |pixel: u32| veiled.get(pixel as usize).copied().unwrap_or(false);
-    entries
-        .extend(rows.filter_map(|(part, row)| is_veiled(part.pixel).then_some((part.pixel, row))));
+    let mut entries: Vec<(G::Place, u32)> = rows
+        .filter(|(_, part)| is_veiled(part.pixel))
+        .map(|(row, part)| (ground.place_of(row, part.pixel), row as u32))
+        .collect();
     entries.sort_unstable();
-    let entries = std::mem::take(entries);
-    for of_pixel in entries.chunk_by(|a, b| a.0 == b.0) {
-        let pixel = of_pixel[0].0;
-        let row = first_row + pixel / grid.width;
-        let corner = DVec2::new(f64::from(pixel % grid.width), f64::from(row));
-        let opaque = of_pixel.partition_point(|&(_, part)| (part as usize) < first_veil);
-        let (opaque, veils) = of_pixel.split_at(opaque);
+    for of_place in entries.chunk_by(|a, b| a.0 == b.0) {
+        let opaque = of_place.partition_point(|&(_, part)| (part as usize) < first_veil);
+        let (opaque, veils) = of_place.split_at(opaque);
+        if veils.is_empty() {
+            continue;
+        }
         let mut pixel = Pixel {
             map,
-            grid,
-            corner,
+            ground,
+            place: of_place[0].0,
             diced,
             buffers,
         };
         pixel.lay(veils, opacities, first_veil);
         pixel.see(opaque);
     }
-    buffers.entries = entries;
 }
 
-/// A pixel at work.
-struct Pixel<'a, D: Diced> {
+/// A pixel, or a region of one, at work.
+struct Pixel<'a, G: Ground, D: Diced> {
     map: &'a VisibilityMap,
-    grid: &'a PixelGrid,
-    /// Its top left corner in the grid.
-    corner: DVec2,
+    ground: &'a G,
+    place: G::Place,
     diced: &'a mut D,
     buffers: &'a mut VeilBuffers<D::Measure>,
 }
 
-impl<D: Diced> Pixel<'_, D> {
+impl<G: Ground, D: Diced> Pixel<'_, G, D> {
     /// Makes layers of the parts of veils. What lets all through is done.
-    fn lay(&mut self, veils: &[(u32, u32)], opacities: &[f32], first_veil: usize) {
-        let Self { map, grid, .. } = *self;
+    fn lay(&mut self, veils: &[(G::Place, u32)], opacities: &[f32], first_veil: usize) {
+        let Self {
+            map, ground, place, ..
+        } = *self;
         let VeilBuffers {
             layers,
             points,
@@ -158,7 +217,7 @@ impl<D: Diced> Pixel<'_, D> {
             let start = points.len() as u32;
             let measure = self.diced.measure(row as usize);
             if opacity > 0.0 {
-                points.extend_from_slice(clip.clip(map, grid, fragment, self.corner));
+                points.extend_from_slice(ground.clip(place, fragment, clip));
             }
             if points.len() as u32 == start {
                 self.diced.set_measure(row as usize, measure * opacity);
@@ -169,7 +228,7 @@ impl<D: Diced> Pixel<'_, D> {
             layers.push(Layer {
                 part: row,
                 face,
-                plane: grid.affine_in_pixels(nearness, self.corner),
+                plane: ground.nearness(place, nearness),
                 opacity,
                 measure,
                 start,
@@ -180,7 +239,7 @@ impl<D: Diced> Pixel<'_, D> {
     }
 
     /// Finds what is seen of the layers and of the parts of opaque fragments, `opaque`.
-    fn see(&mut self, opaque: &[(u32, u32)]) {
+    fn see(&mut self, opaque: &[(G::Place, u32)]) {
         let VeilBuffers {
             layers,
             points,
@@ -203,7 +262,7 @@ impl<D: Diced> Pixel<'_, D> {
                     regions.total()
                 } else {
                     let fragment = diced.parts().boundary[row].fragment;
-                    regions.through(clip.clip(self.map, self.grid, fragment, self.corner))
+                    regions.through(self.ground.clip(self.place, fragment, clip))
                 };
                 diced.set_measure(row, seen);
             }
@@ -214,7 +273,7 @@ impl<D: Diced> Pixel<'_, D> {
         for &(_, row) in opaque {
             let start = points.len();
             let fragment = diced.parts().boundary[row as usize].fragment;
-            points.extend_from_slice(clip.clip(self.map, self.grid, fragment, self.corner));
+            points.extend_from_slice(self.ground.clip(self.place, fragment, clip));
             surfaces.push((row, start..points.len()));
         }
         let mut told: Vec<(u32, D::Measure)> = Vec::new();

@@ -17,6 +17,7 @@ mod lens;
 mod mapping;
 mod names;
 mod orientation;
+pub mod patches;
 mod projection;
 mod reprojection;
 mod run;

@@ -10,6 +10,9 @@
 //!    ready for evaluation anywhere (`surface.rs`).
 //! 3. [`Surfaces::shade`] evaluates the parts of a band.
 //!
+//! Where a part lies in the image plane, its [`Ground`] tells: a grid of pixels, or the patches of a picture by another
+//! lens ([`PatchedPlaces`]).
+//!
 //! [`Points`] tells of a face what is not light: where its points are, and how they are turned.
 //!
 //! Of veils, faces that are not fully opaque, the opacity is evaluated beside the radiance. A part of a
@@ -19,13 +22,15 @@
 //! ([`Scene::lights`]) are not looked at.
 
 pub mod light;
+mod patched;
 mod points;
 mod surface;
 mod texture;
 
+pub use patched::PatchedPlaces;
 pub use points::Points;
 
-use crate::dice::{Parts, PixelGrid};
+use crate::dice::{Part, Parts, PixelGrid};
 use crate::scene::{AlphaMode, Material, Scene, TextureRef};
 use light::Daylight;
 use rayon::prelude::*;
@@ -111,6 +116,61 @@ impl<'a> Textures<'a> {
             pyramids: pyramids.collect(),
             of_material,
         }
+    }
+}
+
+/// Where in the image plane something is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImagePlace {
+    /// The image point.
+    pub at: DVec2,
+    /// How it changes from a pixel of the picture to the next one in its row.
+    pub per_column: DVec2,
+    /// How it changes from a pixel to the one below.
+    pub per_row: DVec2,
+}
+
+/// Tells where in the image plane the parts of a band lie.
+pub trait Ground {
+    /// The place of a part's centroid; `index` is its row of [`Parts::boundary`].
+    fn of_part(&self, index: usize, part: &Part) -> ImagePlace;
+
+    /// The centre of a pixel, counted from the band's first one; `index` is the row of [`Parts::runs`] that
+    /// it is in.
+    fn of_run(&self, index: usize, pixel: u32) -> ImagePlace;
+}
+
+/// A band of a pixel grid that lies on the image plane.
+struct BandOfGrid<'a> {
+    grid: &'a PixelGrid,
+    first_row: u32,
+}
+
+impl BandOfGrid<'_> {
+    /// What is seen at `from_corner` from the top left corner of a pixel.
+    #[inline(always)]
+    fn at(&self, pixel: u32, from_corner: DVec2) -> ImagePlace {
+        let grid = self.grid;
+        let row = self.first_row + pixel / grid.width;
+        let corner = DVec2::new(f64::from(pixel % grid.width), f64::from(row));
+        let per_pixel = grid.pixels_per_frame.recip();
+        ImagePlace {
+            at: grid.image_from_pixels(corner + from_corner),
+            per_column: DVec2::new(per_pixel.x, 0.0),
+            per_row: DVec2::new(0.0, per_pixel.y),
+        }
+    }
+}
+
+impl Ground for BandOfGrid<'_> {
+    #[inline(always)]
+    fn of_part(&self, _index: usize, part: &Part) -> ImagePlace {
+        self.at(part.pixel, part.centroid.as_dvec2())
+    }
+
+    #[inline(always)]
+    fn of_run(&self, _index: usize, pixel: u32) -> ImagePlace {
+        self.at(pixel, DVec2::splat(0.5))
     }
 }
 
@@ -206,17 +266,18 @@ impl<'a> Surfaces<'a> {
     /// Radiance of `parts`, of the band of `grid` that starts at row `first_row`. `radiance` is
     /// overwritten.
     pub fn shade(&self, parts: &Parts, grid: &PixelGrid, first_row: u32, radiance: &mut Radiance) {
+        self.shade_on(&BandOfGrid { grid, first_row }, parts, radiance);
+    }
+
+    /// [`Surfaces::shade`] for parts that lie on any ground.
+    pub fn shade_on(&self, ground: &impl Ground, parts: &Parts, radiance: &mut Radiance) {
         radiance.clear();
-        let corner = |pixel: u32| {
-            let row = first_row + pixel / grid.width;
-            DVec2::new(f64::from(pixel % grid.width), f64::from(row))
-        };
-        for part in &parts.boundary {
+        for (index, part) in parts.boundary.iter().enumerate() {
             let (light, opacity) = match self.surfaces[part.fragment as usize] {
                 Surface::Constant(light) => (light, self.constant_opacity(part.fragment)),
                 Surface::Varying(row) => {
-                    let place = corner(part.pixel) + part.centroid.as_dvec2();
-                    let (light, opacity) = self.look(&self.varying[row as usize], grid, place);
+                    let place = ground.of_part(index, part);
+                    let (light, opacity) = self.look(&self.varying[row as usize], &place);
                     let is_veil = self.constant_opacity(part.fragment).is_some();
                     (light, is_veil.then_some(opacity))
                 }
@@ -224,32 +285,32 @@ impl<'a> Surfaces<'a> {
             radiance.boundary.push(light);
             radiance.opacities.extend(opacity);
         }
-        for run in &parts.runs {
+        for (index, run) in parts.runs.iter().enumerate() {
             match self.surfaces[run.fragment as usize] {
                 Surface::Constant(value) => radiance.runs.push(value),
                 Surface::Varying(row) => {
                     let face = &self.varying[row as usize];
-                    let first = corner(run.pixel) + 0.5;
-                    radiance.runs.extend((0..run.length).map(|step| {
-                        self.look(face, grid, first + DVec2::new(f64::from(step), 0.0))
-                            .0
-                    }));
+                    let pixels = run.pixels().map(|pixel| pixel as u32);
+                    let places = pixels.map(|pixel| ground.of_run(index, pixel));
+                    radiance
+                        .runs
+                        .extend(places.map(|place| self.look(face, &place).0));
                 }
             }
             radiance.run_end.push(radiance.runs.len());
         }
     }
 
-    /// Radiance and opacity of a face at a place of the grid.
-    fn look(&self, face: &Varying, grid: &PixelGrid, place: DVec2) -> ([f32; 3], f32) {
+    /// Radiance and opacity of a face at a place of the image plane.
+    fn look(&self, face: &Varying, place: &ImagePlace) -> ([f32; 3], f32) {
         let material = self.scene.material(face.material);
         let pictures = &self.textures.of_material[face.material.index()];
-        let point = face.at(grid.image_from_pixels(place));
-        let (color, opacity) = self.color(material, pictures, &point, grid);
+        let point = face.at(place.at);
+        let (color, opacity) = self.color(material, pictures, &point, place);
         let radiance = if self.unlit || material.unlit {
             color
         } else {
-            color * self.light.on(point.normal) + self.emission(material, pictures, &point, grid)
+            color * self.light.on(point.normal) + self.emission(material, pictures, &point, place)
         };
         (radiance.into(), opacity)
     }
@@ -260,14 +321,14 @@ impl<'a> Surfaces<'a> {
         material: &Material,
         pictures: &Pictures,
         point: &SurfacePoint,
-        grid: &PixelGrid,
+        seen_at: &ImagePlace,
     ) -> (Vec3, f32) {
         let [r, g, b, _] = material.base_color;
         let color = Vec3::new(r, g, b) * point.color;
         let opacity = opacity_of(material, point.opacity);
         match (material.base_color_texture, pictures.color, &point.picture) {
             (Some(texture), Some(picture), Some(place)) => {
-                let texel = self.texel(&texture, picture, place, grid);
+                let texel = self.texel(&texture, picture, place, seen_at);
                 match material.alpha_mode {
                     AlphaMode::Opaque => (color * texel.truncate(), opacity),
                     _ if texel.w > 0.0 => (color * texel.truncate() / texel.w, opacity * texel.w),
@@ -284,13 +345,13 @@ impl<'a> Surfaces<'a> {
         material: &Material,
         pictures: &Pictures,
         point: &SurfacePoint,
-        grid: &PixelGrid,
+        seen_at: &ImagePlace,
     ) -> Vec3 {
         let emission = Vec3::from(material.emissive);
         let place = &point.emissive_picture;
         match (material.emissive_texture, pictures.emission, place) {
             (Some(texture), Some(picture), Some(place)) => {
-                emission * self.texel(&texture, picture, place, grid).truncate()
+                emission * self.texel(&texture, picture, place, seen_at).truncate()
             }
             _ => emission,
         }
@@ -302,13 +363,13 @@ impl<'a> Surfaces<'a> {
         texture: &TextureRef,
         picture: usize,
         place: &PicturePoint,
-        grid: &PixelGrid,
+        seen_at: &ImagePlace,
     ) -> Vec4 {
-        let pixel = grid.pixels_per_frame;
+        let along = |change: DVec2| place.along_x * change.x + place.along_y * change.y;
         self.textures.pyramids[picture].sample(
             place.at,
-            place.along_x / pixel.x,
-            place.along_y / pixel.y,
+            along(seen_at.per_column),
+            along(seen_at.per_row),
             texture.wrap,
         )
     }

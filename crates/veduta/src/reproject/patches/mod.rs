@@ -1,0 +1,32 @@
+//! A lens made of small perspective pictures, so that regions stay regions under it.
+//!
+//! A lens bends lines, and a bent fragment is no polygon. So the picture is cut into small triangles, *patches*, and
+//! within each the lens is replaced by the perspective that sees the same directions at the three corners: between
+//! them, directions are mixed linearly. Lines stay lines in a patch, fragments stay convex polygons, and their areas
+//! in pixels are exact. How far the replacement is off is measured in pixels, and a patch that is off by more than
+//! [`TOLERANCE`] is cut again.
+//!
+//! Two things come for nothing. Patches partition the *picture*, and a patch that looks at what a map covers is
+//! covered wholly: no gap can open between two patches, whatever their sizes, nor in a pole, where a row of pixels
+//! sees a single direction. And a patch mixes directions, not points of any view: where it looks at two faces of a
+//! cube, what the one shows ends in the very line in which the other begins, since directions on the border
+//! between faces are the same numbers in both. So there are no seams to hide.
+//!
+//! Comes in: a [`Projection`]. Goes out: the [`Patch`]es of a band of its picture. Steps:
+//!
+//! 1. `subdivide`: blocks of pixels are halved until the lens is straight enough in them, and follow the rim of
+//!    round lenses;
+//! 2. `patch`: a triangle with its perspective;
+//! 3. `views`: which parts of the faces of a cube around the eye the patches look at, and the [`Camera`]s that see
+//!    them.
+//!
+//! [`Camera`]: veduta_map::Camera
+//! [`Projection`]: super::Projection
+
+mod patch;
+mod subdivide;
+mod views;
+
+pub use patch::Patch;
+pub use subdivide::{Subdivision, TOLERANCE};
+pub use views::{CubeFace, CubeView, cube_views};
