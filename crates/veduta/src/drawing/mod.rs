@@ -11,8 +11,9 @@
 //! 4. `order`: objects as a tree, painted far to near, as an illustrator expects. Regions do not overlap, so
 //!    that any order would do; within an object thin shapes come first.
 //! 5. `trap`: against seams, a shape reaches a little under those painted later.
-//! 6. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
-//! 7. `lines`: visible edges as strokes, and by `hidden` those that are not.
+//! 6. `underpainting`: what lies below all of them, where they have no room for that.
+//! 7. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
+//! 8. `lines`: visible edges as strokes, and by `hidden` those that are not.
 //!
 //! Outlines are those of the map within 1e-12 of the frame. The result is the same for any number of
 //! threads.
@@ -72,7 +73,7 @@ pub enum Evenness {
 pub struct Settings {
     /// How far, in pixels, shapes reach under those painted later; 0 for not at all.
     ///
-    /// The diagonal of a viewer's pixel and a quarter of a pixel is enough: 1.7 pixels at full size.
+    /// Against seams in a viewer that shows the picture at its size or larger 2 are enough, 4 at half its size.
     pub trap: f64,
     /// Which faces become one shape.
     pub joining: Joining,
@@ -338,7 +339,7 @@ fn shapes(
             shapes: &shapes,
             covered: &covered,
             grid,
-            depth: settings.trap - SPARE,
+            depth: settings.trap * DEPTH,
         });
         underpainting.extend(
             strips
@@ -364,8 +365,9 @@ fn mean_radiance(shapes: &[Shape]) -> [f32; 3] {
     sum.map(|sum| if area > 0.0 { (sum / area) as f32 } else { 0.0 })
 }
 
-/// How much less than traps reach, in pixels, is enough around seams.
-const SPARE: f64 = 0.25;
+/// How far around seams, in reaches of traps, something has to lie below: with traps of 2 pixels as far as the
+/// diagonal of a pixel. Farther would fatten more of the outline.
+const DEPTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Thickness in pixels of what is not painted: it would change no pixel by a step of 8 bits.
 const UNSEEN: f64 = 1.0 / 256.0;

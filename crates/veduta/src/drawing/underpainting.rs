@@ -27,6 +27,7 @@ use i_overlay::float::single::SingleFloatOverlay;
 use i_overlay::mesh::float::outline::offset::OutlineOffset;
 use i_overlay::mesh::float::style::OutlineStyle;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use veduta_geometry::{Affine, DVec2, cross, signed_area};
 
 /// What lies below all shapes, in the colour of one of them.
@@ -71,6 +72,9 @@ const INSET: f64 = 1.0;
 /// How far from the outline the ground is sure to be, in pixels: inset corners are cut off, and its outline is
 /// made simple.
 const FROM_RIM: f64 = 1.5 * INSET + ROUGH;
+
+/// Side in pixels of the squares that strips are made of.
+const CELL: f64 = 0.5;
 
 /// How far from a seam, in depths, shapes are looked for that may fill what is around it.
 const SEARCHED: f64 = 3.0;
@@ -427,33 +431,35 @@ impl Painted<'_> {
 
     /// The outlines of strips around gaps.
     fn strips(&self, gaps: &[&Gap]) -> Vec<Vec<DVec2>> {
-        let strips: Vec<_> = gaps
-            .iter()
-            .map(|gap| strip_around(gap.ends, self.depth).map(|corner| corner.to_array()))
-            .map(|corners| corners.to_vec())
+        // Made of cells, by row and column: gaps may be many thousands in a few pixels.
+        let mut cells: BTreeSet<[i64; 2]> = BTreeSet::new();
+        for gap in gaps {
+            let [from, to] = gap.ends.map(|end| end / CELL);
+            let steps = (to - from).length().ceil().max(1.0);
+            // Half a step farther, for what lies between a point and the next.
+            let reach = self.depth / CELL + 0.5;
+            for step in 0..=steps as u32 {
+                let point = from.lerp(to, f64::from(step) / steps);
+                let [low, high] = [(point - reach).floor(), (point + reach).ceil()];
+                for row in low.y as i64..high.y as i64 {
+                    cells.extend((low.x as i64..high.x as i64).map(|column| [row, column]));
+                }
+            }
+        }
+        let cells: Vec<[i64; 2]> = cells.into_iter().collect();
+        let rectangles: Vec<Vec<[f64; 2]>> = cells
+            .chunk_by(|a, b| a[0] == b[0] && a[1] + 1 == b[1])
+            .map(|run| {
+                let ([row, first], [_, last]) = (run[0], run[run.len() - 1]);
+                let sides = [first, last + 1, row, row + 1];
+                let [left, right, top, bottom] = sides.map(|at| at as f64 * CELL);
+                vec![[left, top], [right, top], [right, bottom], [left, bottom]]
+            })
             .collect();
-        let strips = strips.simplify_shape(FillRule::NonZero);
-        let corners: Vec<DVec2> = strips
-            .iter()
-            .flatten()
-            .flatten()
-            .copied()
-            .map(DVec2::from)
-            .collect();
+        let corners: Vec<DVec2> = rectangles.concat().into_iter().map(DVec2::from).collect();
         let covered = self.covered.within(box_around(&corners));
+        let strips = rectangles.simplify_shape(FillRule::NonZero);
         let strips = strips.overlay(&covered, OverlayRule::Intersect, FillRule::NonZero);
         simplified(strips, ON_RIM)
     }
-}
-
-/// The corners of a rectangle that contains what lies within `reach` of a segment, wound positively.
-fn strip_around([from, to]: [DVec2; 2], reach: f64) -> [DVec2; 4] {
-    let along = reach * (to - from).normalize_or(DVec2::X);
-    let across = along.perp();
-    [
-        from - along - across,
-        to + along - across,
-        to + along + across,
-        from - along + across,
-    ]
 }
