@@ -37,11 +37,12 @@ pub struct Vector {
     /// Colour of the lines, such as #204060; black by default
     #[arg(long, value_name = "COLOUR", value_parser = values::color)]
     line_color: Option<[f32; 3]>,
-    /// The angle between two faces from which on their edge is a crease; 30deg by default
+    /// The angle between two faces from which on their edge is a crease; 30deg by default. Edges that are shaded
+    /// smoothly, by equal normals on both sides, are none
     #[arg(long, value_name = "ANGLE", value_parser = values::crease_angle)]
     crease_angle: Option<f64>,
     /// How far shapes reach under those on top of them, in pixels, so that viewers show no seams; 2 by
-    /// default, enough to view the picture at nine tenths of its size. 0 for outlines as they are seen
+    /// default, enough to view the picture at its size or larger. 0 for outlines as they are seen
     #[arg(long, value_name = "PIXELS", value_parser = values::trap)]
     trap: Option<f64>,
     /// Decimals of coordinates, in pixels: 0 to 9; 2 by default

@@ -9,16 +9,19 @@
 //! without the bookkeeping that saves looking at faces again).
 
 use super::lines::{JOINED, Judge, normal_of};
+use super::parts::{WHOLE, positive};
+use super::places::{Places, box_around};
 use super::{COINCIDENT, LineKind, is_on_frame};
-use crate::buckets::Buckets;
 use rayon::prelude::*;
-use std::ops::Range;
 use veduta_geometry::{Affine, DVec2, cross};
 use veduta_map::{FaceId, Faces, VisibilityMap};
 
 /// Gaps in what hides an edge, and hidden parts, that are not looked at: shares of the frame. Where faces
 /// share a side that crosses the edge, rounding leaves gaps.
 const NEGLIGIBLE_LENGTH: f64 = 1e-10;
+
+/// How near to an edge, as a share of the frame, faces are looked at: more than rounding is enough.
+const NEARBY: f64 = 1e-9;
 
 /// An edge of a face as it is seen, or would be.
 #[derive(Clone, Copy)]
@@ -31,12 +34,16 @@ struct Edge {
 
 /// Where edges of the kinds that `judge` looks for are hidden: segments in the image plane.
 pub(super) fn segments(judge: &Judge, map: &VisibilityMap) -> Vec<[DVec2; 2]> {
-    let places = Places::new(&map.faces);
+    let faces = (0..map.faces.len() as u32).map(FaceId);
+    let boxes: Vec<_> = faces
+        .map(|face| box_around(map.faces.outline(face)))
+        .collect();
+    let places = Places::new(boxes.into_iter());
     let edges = edges(judge, map, &places);
     let of_edges: Vec<Vec<[DVec2; 2]>> = edges
         .par_iter()
         .map_init(Vec::new, |near, edge| {
-            places.along(edge.from, edge.to, near);
+            places.along(edge.from, edge.to, NEARBY, near);
             hidden_parts(map, edge, near)
         })
         .collect();
@@ -127,7 +134,7 @@ fn is_wanted(
     map: &VisibilityMap,
     places: &Places,
     sides: &[Side],
-    near: &mut Vec<FaceId>,
+    near: &mut Vec<u32>,
 ) -> bool {
     let faces = &map.faces;
     let first = &sides[0];
@@ -151,23 +158,24 @@ fn is_wanted(
         }
         return rest
             .iter()
-            .any(|side| judge.is_crease(angle_with(side.face)));
+            .any(|side| judge.is_crease([first.face, side.face], angle_with(side.face)));
     }
     let is_boundary = || judge.is_boundary(first.face, first.ends);
     // A corner of one may lie on the edge of the other, so that they share no edge.
     let [from, to] = first.ends;
     let middle = 0.5 * (from + to);
-    places.along(middle, middle, near);
+    places.along(middle, middle, NEARBY, near);
     let unit = JOINED * super::join::depth_unit(&map.camera, first.nearness);
-    let other = near.iter().find(|&&other| {
+    let other = near.iter().map(|&face| FaceId(face)).find(|&other| {
         other != first.face
             && !faces.is_veil(other)
             && (faces.face_nearness(other).at(middle) - first.nearness).abs() <= unit
             && contains(faces.outline(other), middle)
     });
     match other {
-        Some(&other) => {
-            judge.is_crease(angle_with(other)) || judge.wants(LineKind::Boundary) && is_boundary()
+        Some(other) => {
+            judge.is_crease([first.face, other], angle_with(other))
+                || judge.wants(LineKind::Boundary) && is_boundary()
         }
         // Its neighbour is seen edge-on, if it has one. Otherwise it comes of the near plane's cut.
         None if judge.wants(LineKind::Silhouette) => judge.is_edge(first.face, first.ends),
@@ -187,11 +195,11 @@ fn contains(outline: &[DVec2], point: DVec2) -> bool {
 }
 
 /// Where an edge is hidden by the faces near it.
-fn hidden_parts(map: &VisibilityMap, edge: &Edge, near: &[FaceId]) -> Vec<[DVec2; 2]> {
+fn hidden_parts(map: &VisibilityMap, edge: &Edge, near: &[u32]) -> Vec<[DVec2; 2]> {
     let length = (edge.to - edge.from).length();
     let mut intervals: Vec<[f64; 2]> = near
         .iter()
-        .filter_map(|&face| hidden_by(map, edge, face))
+        .filter_map(|&face| hidden_by(map, edge, FaceId(face)))
         .collect();
     intervals.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     let mut parts: Vec<[f64; 2]> = Vec::new();
@@ -234,7 +242,7 @@ fn hidden_by(map: &VisibilityMap, edge: &Edge, face: FaceId) -> Option<[f64; 2]>
     if map.faces.is_veil(face) {
         return None;
     }
-    let mut part = [0.0, 1.0];
+    let mut part = WHOLE;
     let outline = map.faces.outline(face);
     for (k, &from) in outline.iter().enumerate() {
         let along = outline[(k + 1) % outline.len()] - from;
@@ -251,94 +259,4 @@ fn hidden_by(map: &VisibilityMap, edge: &Edge, face: FaceId) -> Option<[f64; 2]>
     let joined = JOINED * super::join::depth_unit(&map.camera, middle);
     // What is joined to the edge does not hide it.
     (nearer_at(part[0]).max(nearer_at(part[1])) > joined).then_some(part)
-}
-
-/// The part in which an affine function with these values at 0 and 1 is positive.
-fn positive([start, end]: [f64; 2], at_start: f64, at_end: f64) -> Option<[f64; 2]> {
-    let part = match (at_start > 0.0, at_end > 0.0) {
-        (true, true) => [start, end],
-        (false, false) => return None,
-        (starts, _) => {
-            let zero = at_start / (at_start - at_end);
-            if starts {
-                [start, end.min(zero)]
-            } else {
-                [start.max(zero), end]
-            }
-        }
-    };
-    (part[0] < part[1]).then_some(part)
-}
-
-/// Which faces lie where: by the cells of a grid that their boxes meet.
-struct Places {
-    cells: u32,
-    /// By cell, rows of `faces`.
-    in_cells: Buckets,
-    /// A face once for each row of cells that it meets.
-    faces: Vec<FaceId>,
-}
-
-impl Places {
-    fn new(faces: &Faces) -> Self {
-        // Finer grids hold the large faces of a scene too often.
-        let cells = (faces.len() as f64).sqrt().clamp(1.0, 128.0) as u32;
-        let mut rows = Vec::new();
-        let mut in_rows = Vec::new();
-        for face in faces.ids() {
-            let outline = faces.outline(face).iter().copied();
-            let low = outline.clone().fold(DVec2::INFINITY, DVec2::min);
-            let high = outline.fold(DVec2::NEG_INFINITY, DVec2::max);
-            let columns = range(cells, low.x, high.x);
-            for row in range(cells, low.y, high.y) {
-                rows.push(face);
-                in_rows.push(row * cells + columns.start..row * cells + columns.end);
-            }
-        }
-        Self {
-            cells,
-            in_cells: Buckets::new((cells * cells) as usize, &in_rows),
-            faces: rows,
-        }
-    }
-
-    /// The faces near a segment, ascending.
-    fn along(&self, from: DVec2, to: DVec2, near: &mut Vec<FaceId>) {
-        near.clear();
-        let (top, bottom) = if from.y <= to.y {
-            (from, to)
-        } else {
-            (to, from)
-        };
-        for row in range(self.cells, top.y, bottom.y) {
-            // Where it meets the row, and a little beyond.
-            let x_at = |border: u32| {
-                let y = f64::from(border) / f64::from(self.cells);
-                let share = ((y - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
-                // Along the row all of it does.
-                if share.is_nan() {
-                    None
-                } else {
-                    Some(top.x + share * (bottom.x - top.x))
-                }
-            };
-            let [one, other] = match (x_at(row), x_at(row + 1)) {
-                (Some(one), Some(other)) => [one, other],
-                _ => [top.x, bottom.x],
-            };
-            let margin = 1e-9;
-            for column in range(self.cells, one.min(other) - margin, one.max(other) + margin) {
-                let rows = self.in_cells.of((row * self.cells + column) as usize);
-                near.extend(rows.iter().map(|&row| self.faces[row as usize]));
-            }
-        }
-        near.sort_unstable();
-        near.dedup();
-    }
-}
-
-/// The cells, across the frame, in which what reaches from `low` to `high` lies.
-fn range(cells: u32, low: f64, high: f64) -> Range<u32> {
-    let cell = |at: f64| ((at * f64::from(cells)).floor().max(0.0) as u32).min(cells - 1);
-    cell(low)..cell(high) + 1
 }

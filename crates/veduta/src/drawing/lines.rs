@@ -83,6 +83,10 @@ fn each_once(segments: &[(LineKind, [DVec2; 2])]) -> (Vec<Piece>, Vec<DVec2>) {
     (pieces, cut.vertices)
 }
 
+/// Cosine of the angle up to which two normals at one place are one: a degree, far more than rounding and far
+/// less than any edge that is meant.
+const SAME_NORMAL: f32 = 0.9998;
+
 /// Says what kind of line a side is.
 pub(super) struct Judge<'a> {
     scene: &'a Scene,
@@ -141,9 +145,28 @@ impl<'a> Judge<'a> {
         self.wanted.contains(&kind)
     }
 
-    /// Whether an edge between two faces at that angle is to be drawn.
-    pub fn is_crease(&self, angle: f64) -> bool {
-        self.wants(LineKind::Crease) && angle > self.crease_angle
+    /// Whether the edge between two faces at that angle is to be drawn.
+    pub fn is_crease(&self, faces: [FaceId; 2], angle: f64) -> bool {
+        self.wants(LineKind::Crease) && angle > self.crease_angle && !self.is_smooth(faces)
+    }
+
+    /// Whether two faces share an edge across which light changes gradually: both have the same normals there.
+    /// However large their angle, the edge then stands for a rounding.
+    fn is_smooth(&self, faces: [FaceId; 2]) -> bool {
+        let objects = faces.map(|face| self.map.faces.object(face));
+        let mesh = self.scene.mesh_of(objects[0]);
+        if objects[0] != objects[1] || mesh.normals.is_empty() {
+            return false;
+        }
+        let [one, other] = faces.map(|face| mesh.corners_of(self.map.faces.source(face)));
+        let other: Vec<u32> = other.collect();
+        let at = |corner: u32| mesh.positions[corner as usize];
+        let normal = |corner: u32| mesh.normals[corner as usize];
+        let shared = one.filter(|&corner| {
+            let same = other.iter().find(|&&other| at(other) == at(corner));
+            same.is_some_and(|&same| normal(corner).dot(normal(same)) > SAME_NORMAL)
+        });
+        shared.count() > 1
     }
 
     /// The kind of a half-edge; `None` where no line is to be drawn, and for the second of twins.
@@ -155,7 +178,9 @@ impl<'a> Judge<'a> {
         let ends = self.subdivision.ends(index);
         let is = |kind: LineKind| match (kind, &meeting) {
             (LineKind::Silhouette, Meeting::Step) => true,
-            (LineKind::Crease, Meeting::Joint { angle, .. }) => *angle > self.crease_angle,
+            (LineKind::Crease, Meeting::Joint { other, angle }) => {
+                self.is_crease([face, *other], *angle)
+            }
             (LineKind::Boundary, Meeting::Step) => self.is_boundary(face, ends),
             (LineKind::Boundary, Meeting::Joint { other, .. }) => {
                 self.is_boundary(face, ends) || self.is_boundary(*other, ends)

@@ -11,8 +11,9 @@
 //! 4. `order`: objects as a tree, painted far to near, as an illustrator expects. Regions do not overlap, so
 //!    that any order would do; within an object thin shapes come first.
 //! 5. `trap`: against seams, a shape reaches a little under those painted later.
-//! 6. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
-//! 7. `lines`: visible edges as strokes, and by `hidden` those that are not.
+//! 6. `underpainting`: what lies below all of them, where they have no room for that.
+//! 7. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
+//! 8. `lines`: visible edges as strokes, and by `hidden` those that are not.
 //!
 //! Outlines are those of the map within 1e-12 of the frame. The result is the same for any number of
 //! threads.
@@ -22,9 +23,12 @@ mod join;
 mod lines;
 mod near;
 mod order;
+mod parts;
+mod places;
 mod subdivision;
 mod trace;
 mod trap;
+mod underpainting;
 mod veils;
 
 use crate::dice::PixelGrid;
@@ -34,6 +38,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use subdivision::Subdivision;
 use trap::{Reached, Trapper};
+use underpainting::{Covered, Painted, Strips};
 use veduta_geometry::{DVec2, signed_area};
 use veduta_map::{Camera, MaterialId, ObjectId, Projection, VisibilityMap};
 
@@ -68,7 +73,7 @@ pub enum Evenness {
 pub struct Settings {
     /// How far, in pixels, shapes reach under those painted later; 0 for not at all.
     ///
-    /// The diagonal of a viewer's pixel and a quarter of a pixel is enough: 1.7 pixels at full size.
+    /// Against seams in a viewer that shows the picture at its size or larger 2 are enough, 4 at half its size.
     pub trap: f64,
     /// Which faces become one shape.
     pub joining: Joining,
@@ -124,8 +129,8 @@ pub enum LineKind {
 pub struct Drawing {
     /// Width and height of the picture in pixels.
     pub size: [f64; 2],
-    /// What is painted before all shapes, so that nothing lighter or darker is seen between them.
-    pub underpainting: Option<Underpainting>,
+    /// What is painted before all shapes, so that nothing else is seen between them.
+    pub underpainting: Vec<Underpainting>,
     /// The tree of objects, parents before children, in the order in which they are painted.
     pub groups: Vec<Group>,
     /// In the order in which they are painted, which is that of their groups.
@@ -138,12 +143,12 @@ pub struct Drawing {
     pub material_names: Vec<String>,
 }
 
-/// Most of what is covered, in one colour.
+/// What lies under seams, in one colour: that of a shape there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Underpainting {
     /// Outlines and holes, wound as those of shapes are.
     pub outlines: Vec<Vec<DVec2>>,
-    /// Mean radiance (linear Rec.709) of what lies on it.
+    /// Radiance (linear Rec.709).
     pub radiance: [f32; 3],
 }
 
@@ -243,7 +248,7 @@ pub fn draw(
         .collect();
     let subdivision = Subdivision::new(&polygons, COINCIDENT);
     let strokes = lines::strokes(scene, map, &subdivision, grid, settings);
-    let (groups, shapes) = if settings.shapes {
+    let (groups, shapes, underpainting) = if settings.shapes {
         shapes(scene, map, &subdivision, looks, grid, settings)
     } else {
         Default::default()
@@ -253,31 +258,15 @@ pub fn draw(
     } else {
         Vec::new()
     };
-    let has_traps = settings.trap > 0.0 && !shapes.is_empty();
     Drawing {
         size: [f64::from(grid.width), f64::from(grid.height)],
-        underpainting: has_traps.then(|| Underpainting {
-            outlines: trap::underpainting(&subdivision, grid),
-            radiance: mean_radiance(&shapes),
-        }),
+        underpainting,
         groups,
         shapes,
         veils,
         strokes,
         material_names: names(&scene.materials),
     }
-}
-
-fn mean_radiance(shapes: &[Shape]) -> [f32; 3] {
-    let (mut area, mut sum) = (0.0, [0.0; 3]);
-    for shape in shapes {
-        let of_shape: f64 = shape.seen.iter().map(|outline| signed_area(outline)).sum();
-        area += of_shape;
-        for (sum, channel) in sum.iter_mut().zip(shape.radiance) {
-            *sum += of_shape * f64::from(channel);
-        }
-    }
-    sum.map(|sum| if area > 0.0 { (sum / area) as f32 } else { 0.0 })
 }
 
 fn names(materials: &[Material]) -> Vec<String> {
@@ -292,7 +281,7 @@ fn shapes(
     looks: &[Look],
     grid: &PixelGrid,
     settings: &Settings,
-) -> (Vec<Group>, Vec<Shape>) {
+) -> (Vec<Group>, Vec<Shape>, Vec<Underpainting>) {
     let regions = join::join(map, subdivision, looks, settings.joining);
     let outlines: Vec<Outlines> = {
         let mut region_of = vec![0u32; looks.len()];
@@ -324,15 +313,61 @@ fn shapes(
         rank[*fragment as usize] = u32::MAX;
     }
     let trapper = Trapper::new(subdivision, &rank, grid, settings.trap);
-    let shapes = order.par_iter().zip(&group_of);
-    let shapes = shapes.map_init(Reached::default, |reached, (&region, &group)| {
-        let outlines = &outlines[region as usize];
-        let painted = trapper.painted(&outlines.loops, reached);
-        let region = &regions[region as usize];
-        shape(map, looks, region, group, outlines.seen.clone(), painted)
-    });
-    (groups, shapes.collect())
+    let of_regions = order.par_iter();
+    let painted: Vec<Vec<Vec<DVec2>>> = of_regions
+        .map_init(Reached::default, |reached, &region| {
+            trapper.painted(&outlines[region as usize].loops, reached)
+        })
+        .collect();
+    let rows = order.par_iter().zip(&group_of).zip(painted);
+    let shapes: Vec<Shape> = rows
+        .map(|((&region, &group), painted)| {
+            let seen = outlines[region as usize].seen.clone();
+            shape(map, looks, &regions[region as usize], group, seen, painted)
+        })
+        .collect();
+    let mut underpainting = Vec::new();
+    if settings.trap > 0.0 && !shapes.is_empty() {
+        let covered = Covered::of(subdivision, grid);
+        underpainting.push(Underpainting {
+            outlines: underpainting::ground(&covered),
+            radiance: mean_radiance(&shapes),
+        });
+        let strips = underpainting::strips(&Painted {
+            subdivision,
+            rank: &rank,
+            shapes: &shapes,
+            covered: &covered,
+            grid,
+            depth: settings.trap * DEPTH,
+        });
+        underpainting.extend(
+            strips
+                .into_iter()
+                .map(|Strips { shape, outlines }| Underpainting {
+                    outlines,
+                    radiance: shapes[shape as usize].radiance,
+                }),
+        );
+    }
+    (groups, shapes, underpainting)
 }
+
+fn mean_radiance(shapes: &[Shape]) -> [f32; 3] {
+    let (mut area, mut sum) = (0.0, [0.0; 3]);
+    for shape in shapes {
+        let of_shape: f64 = shape.seen.iter().map(|outline| signed_area(outline)).sum();
+        area += of_shape;
+        for (sum, channel) in sum.iter_mut().zip(shape.radiance) {
+            *sum += of_shape * f64::from(channel);
+        }
+    }
+    sum.map(|sum| if area > 0.0 { (sum / area) as f32 } else { 0.0 })
+}
+
+/// How far around seams, in reaches of traps, something has to lie below: with traps of 2 pixels as far as the
+/// diagonal of a pixel. Farther would fatten more of the outline.
+const DEPTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Thickness in pixels of what is not painted: it would change no pixel by a step of 8 bits.
 const UNSEEN: f64 = 1.0 / 256.0;

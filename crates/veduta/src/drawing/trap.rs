@@ -29,16 +29,11 @@
 //! as if they were painted last: however thin a shape is, it would be seen, since the edges of what
 //! lies on top of it let a quarter of it through.
 //!
-//! Where all fails there is the *underpainting*, as painters lay one on the bare canvas: all that is
-//! covered, a pixel within its border, in its mean colour. It shows where seams would be.
+//! What is left open all the same is found afterwards, by `underpainting`.
 
 use super::subdivision::Subdivision;
 use super::{is_on_frame, trace};
 use crate::dice::PixelGrid;
-use i_overlay::core::fill_rule::FillRule;
-use i_overlay::float::simplify::SimplifyShape;
-use i_overlay::mesh::float::outline::offset::OutlineOffset;
-use i_overlay::mesh::float::style::OutlineStyle;
 use std::f64::consts::{PI, TAU};
 use veduta_geometry::{Affine, DVec2, cross, signed_area};
 
@@ -81,13 +76,6 @@ const NEAR_EXIT: f64 = 0.25;
 /// How much of the angle between a chain and an exit at its end its zone leaves open.
 const NEAR_EXIT_SHARE: f64 = 0.25;
 
-/// How far within the border of what is covered the underpainting ends, in pixels. With less, outlines before
-/// the background would look fat; with more, seams would be seen farther from them.
-const INSET: f64 = 1.0;
-
-/// How far, in pixels, the outline of the underpainting may be moved to have fewer corners.
-const ROUGH: f64 = 0.25;
-
 /// The angle in radians that a border must turn by where a chain begins or ends, for its zone to end where
 /// the border would go on.
 const FLAT: f64 = 0.5;
@@ -116,42 +104,6 @@ pub(super) fn thickness(outlines: &[Vec<DVec2>]) -> f64 {
     } else {
         0.0
     }
-}
-
-/// Outlines of all that is covered, [`INSET`] within its border.
-pub(super) fn underpainting(subdivision: &Subdivision, grid: &PixelGrid) -> Vec<Vec<DVec2>> {
-    let edges = 0..subdivision.half_edges().len() as u32;
-    let border: Vec<u32> = edges
-        .filter(|&edge| subdivision.across(edge).is_none())
-        .collect();
-    // At the frame it goes on to the frame.
-    let beyond = |point: DVec2| {
-        let on_frame = |at: f64| {
-            let is_at = |side: f64| f64::from((at - side).abs() <= 2.0 * super::COINCIDENT);
-            is_at(1.0) - is_at(0.0)
-        };
-        grid.pixels_from_image(point) + INSET * DVec2::new(on_frame(point.x), on_frame(point.y))
-    };
-    let loops = trace::loops(subdivision, &border);
-    let outlines: Vec<Vec<[f64; 2]>> = loops
-        .iter()
-        .map(|edges| {
-            let points = edges.iter().map(|&edge| beyond(subdivision.ends(edge)[0]));
-            points.map(|point| point.to_array()).collect()
-        })
-        .collect();
-    let style = OutlineStyle::new(-INSET);
-    // Loops may touch themselves in points.
-    let shapes = outlines.simplify_shape(FillRule::NonZero).outline(&style);
-    shapes
-        .into_iter()
-        .flatten()
-        .filter_map(|outline| {
-            let points: Vec<DVec2> = outline.into_iter().map(DVec2::from).collect();
-            let corners = trace::corners(&points, ROUGH);
-            (!corners.is_empty()).then(|| corners.into_iter().map(|c| points[c]).collect())
-        })
-        .collect()
 }
 
 /// A straight part of a shape's border, all of it towards later shapes, or none of it.

@@ -22,6 +22,12 @@ impl Rounding {
         }
     }
 
+    /// A length in units of the last decimal, without what rounding adds to it.
+    #[cfg(feature = "svg")]
+    pub fn units(self, length: f64) -> f64 {
+        (length * self.units * 1e3).round() / 1e3
+    }
+
     fn point(self, point: DVec2) -> Point {
         (point * self.units)
             .to_array()

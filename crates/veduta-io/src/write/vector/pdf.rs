@@ -154,7 +154,7 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
         let [width, height] = drawing.size;
         content.push(format_args!("0 0 {width} {height} re f\n"));
     }
-    if let Some(Underpainting { outlines, radiance }) = &drawing.underpainting {
+    for Underpainting { outlines, radiance } in &drawing.underpainting {
         content.shape(outlines, *radiance);
     }
     let mut open: Vec<u32> = Vec::new();

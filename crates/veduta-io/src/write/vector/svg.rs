@@ -3,8 +3,12 @@ use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
 use std::collections::HashSet;
 use std::fmt::Write;
 use veduta::drawing::{Drawing, LineKind, Underpainting};
+use veduta_geometry::DVec2;
 
 /// SVG text. Groups nest as names do; a path is a shape, in relative coordinates.
+///
+/// Coordinates are whole numbers of the last decimal, which the `viewBox` scales to pixels: a decimal point in
+/// each of them would make files a seventh larger.
 pub fn encode(drawing: &Drawing, options: &VectorOptions) -> String {
     let mut svg = Svg {
         text: String::new(),
@@ -25,9 +29,10 @@ struct Svg {
 impl Svg {
     fn document(&mut self, drawing: &Drawing, options: &VectorOptions) {
         let [width, height] = drawing.size;
+        let [right, bottom] = drawing.size.map(|side| self.rounding.units(side));
         self.push(format_args!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {width} {height}\">\n"
+             viewBox=\"0 0 {right} {bottom}\">\n"
         ));
         if !options.title.is_empty() {
             self.title(&options.title);
@@ -35,16 +40,15 @@ impl Svg {
         if let Some(color) = options.background {
             let color = Color(srgb8(color));
             self.push(format_args!(
-                "<rect width=\"{width}\" height=\"{height}\" fill=\"{color}\"/>\n"
+                "<rect width=\"{right}\" height=\"{bottom}\" fill=\"{color}\"/>\n"
             ));
         }
-        if let Some(Underpainting { outlines, radiance }) = &drawing.underpainting {
-            let rings = self.rounding.rings(outlines);
-            let id = self.id("underpainting");
-            let color = Color(srgb8(*radiance));
-            self.push(format_args!("<path id=\"{id}\" fill=\"{color}\" d=\""));
-            self.path(&rings, true);
-            self.text.push_str("\"/>\n");
+        if !drawing.underpainting.is_empty() {
+            self.begin_group("underpainting");
+            for Underpainting { outlines, radiance } in &drawing.underpainting {
+                self.shape(outlines, *radiance);
+            }
+            self.text.push_str("</g>\n");
         }
         self.groups(drawing);
         if !drawing.veils.is_empty() {
@@ -67,17 +71,21 @@ impl Svg {
             open.push(index);
             self.begin_group(&group.name);
             for shape in &drawing.shapes[group.shapes.clone()] {
-                let rings = self.rounding.rings(&shape.painted);
-                if !rings.is_empty() {
-                    let color = Color(srgb8(shape.radiance));
-                    self.push(format_args!("<path fill=\"{color}\" d=\""));
-                    self.path(&rings, true);
-                    self.text.push_str("\"/>\n");
-                }
+                self.shape(&shape.painted, shape.radiance);
             }
         }
         for _ in open {
             self.text.push_str("</g>\n");
+        }
+    }
+
+    fn shape(&mut self, outlines: &[Vec<DVec2>], radiance: [f32; 3]) {
+        let rings = self.rounding.rings(outlines);
+        if !rings.is_empty() {
+            let color = Color(srgb8(radiance));
+            self.push(format_args!("<path fill=\"{color}\" d=\""));
+            self.path(&rings, true);
+            self.text.push_str("\"/>\n");
         }
     }
 
@@ -105,7 +113,8 @@ impl Svg {
 
     fn lines(&mut self, drawing: &Drawing, options: &VectorOptions) {
         let id = self.id("lines");
-        let (color, width) = (Color(srgb8(options.line_color)), options.line_width);
+        let color = Color(srgb8(options.line_color));
+        let width = self.rounding.units(options.line_width);
         self.push(format_args!(
             "<g id=\"{id}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\" \
              stroke-linecap=\"round\" stroke-linejoin=\"round\">\n"
@@ -114,7 +123,9 @@ impl Svg {
             let name = name_of_lines(strokes[0].kind);
             if strokes[0].kind == LineKind::Hidden {
                 let id = self.id(name);
-                let [narrow, dash, gap] = hidden_line(width);
+                let [narrow, dash, gap] = hidden_line(options.line_width);
+                let [narrow, dash, gap] =
+                    [narrow, dash, gap].map(|length| self.rounding.units(length));
                 self.push(format_args!(
                     "<g id=\"{id}\" stroke-width=\"{narrow}\" stroke-dasharray=\"{dash} {gap}\" \
                      stroke-linecap=\"butt\">"
@@ -230,7 +241,7 @@ impl Svg {
             if value >= 0 && (index > 0 || !after_letter) {
                 self.text.push(' ');
             }
-            self.rounding.push(&mut self.text, value);
+            self.push(format_args!("{value}"));
         }
     }
 }
