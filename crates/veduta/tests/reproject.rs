@@ -236,7 +236,7 @@ fn poles_and_rims_are_filtered_in_parts() {
 fn smooth_fields_lie_where_they_are() {
     let turn = Orientation::from_angles(0.2, 0.1, 0.0);
     let width = 96;
-    let views = views(&cube(96, &turn), &smooth, 4);
+    let views = views(&cube(320, &turn), &smooth, 2);
     for lens in [
         "fisheye:180",
         "equirect",

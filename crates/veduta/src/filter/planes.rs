@@ -168,7 +168,7 @@ impl Planes {
         let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
         let mut half = Self::new(width, height, self.channels, apron);
         // An odd number of columns does not repeat after half of them.
-        half.repeats = self.repeats && self.width % 2 == 0;
+        half.repeats = self.repeats && self.width.is_multiple_of(2);
         for row in 0..height as i32 {
             for channel in 0..self.channels {
                 let of_row = |offset: i32| {

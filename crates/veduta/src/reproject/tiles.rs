@@ -196,9 +196,11 @@ impl Cutter<'_> {
             let at = between * node(k);
             let near = polynomial.at(at) + base;
             let exact = mapping.texel_near(view, middle + at, near);
-            let off = exact.map_or(f64::INFINITY, |exact| (exact - near).abs().max_element());
-            // Not a number is too far, too.
-            if !(off <= MOST_ERROR) {
+            let within = exact.is_some_and(|exact| {
+                let off = (exact - near).abs();
+                off.cmple(DVec2::splat(MOST_ERROR)).all()
+            });
+            if !within {
                 return Fit::None;
             }
         }

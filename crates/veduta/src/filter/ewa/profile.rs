@@ -81,15 +81,15 @@ impl Round {
     /// [`Profile::Sharp`]: least squares over the frequencies below 0.45 of a texel, of what box texels filtered by
     /// it give against box pixels of 0.75 to 1.15 texels, aliases included.
     pub const SHARP: Self = Self {
-        coefficients: [1.0, -3.412_729_4, -0.134_066_47, 7.609_821_4, -8.667_322_4],
+        coefficients: [1.0, -3.412_729_4, -0.134_066_47, 7.609_821_4, -8.667_322],
     };
     /// [`Profile::Robidoux`], to 0.4 % of the peak.
     pub const ROBIDOUX: Self = Self {
-        coefficients: [1.0, -5.551_991_5, 10.556_595, -9.634_961_7, 3.176_264],
+        coefficients: [1.0, -5.551_991_5, 10.556_595, -9.634_962, 3.176_264],
     };
     /// [`Profile::Mitchell`], to 0.5 % of the peak.
     pub const MITCHELL: Self = Self {
-        coefficients: [1.0, -5.686_460_2, 10.913_013, -10.039_917, 3.339_355_4],
+        coefficients: [1.0, -5.686_46, 10.913_013, -10.039_917, 3.339_355_4],
     };
 
     /// The integral over q from 0 to 1.

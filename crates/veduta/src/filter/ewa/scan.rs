@@ -16,6 +16,22 @@ pub(crate) fn mean<V: Vector, const C: usize>(
     footprints: &Footprints,
     lane: usize,
 ) -> [f32; C] {
+    let mean = unclamped::<V, C>(token, ewa, planes, base, footprints, lane);
+    if ewa.clamp && footprints.sharp[lane] > 0.0 {
+        return clamped(mean, planes, base, footprints, lane);
+    }
+    mean
+}
+
+#[inline(always)]
+fn unclamped<V: Vector, const C: usize>(
+    token: V::Token,
+    ewa: &Ewa,
+    planes: &Planes,
+    base: [i32; 2],
+    footprints: &Footprints,
+    lane: usize,
+) -> [f32; C] {
     let sharp = footprints.sharp[lane];
     if sharp <= 0.0 {
         return scan::<V, _, C>(token, &Gaussian, planes, base, footprints, lane);
@@ -110,4 +126,35 @@ fn quotients<V: Vector, const C: usize>(token: V::Token, sum: &[V; C], weight: V
         *mean = total * inverse;
     }
     means
+}
+
+/// A mean between the darkest and the lightest of the texels in its footprint.
+fn clamped<const C: usize>(
+    mut mean: [f32; C],
+    planes: &Planes,
+    base: [i32; 2],
+    of: &Footprints,
+    lane: usize,
+) -> [f32; C] {
+    let [u, v] = of.centre.map(|centre| centre[lane]);
+    let [a, b, c] = of.equation.map(|coefficient| coefficient[lane]);
+    let [first_column, first_row] = of.first.map(|first| first[lane]);
+    let [columns, rows] = of.count.map(|count| count[lane]);
+    let (mut low, mut high) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+    for row in first_row..first_row + rows {
+        for column in first_column..first_column + columns {
+            let (x, y) = (column as f32 - u, row as f32 - v);
+            if a * x * x + y * (b * x + c * y) < 1.0 {
+                let texel = planes.texel(base[0] + column, base[1] + row);
+                for k in 0..C {
+                    low[k] = low[k].min(texel[k]);
+                    high[k] = high[k].max(texel[k]);
+                }
+            }
+        }
+    }
+    for (k, mean) in mean.iter_mut().enumerate() {
+        *mean = mean.max(low[k]).min(high[k]);
+    }
+    mean
 }
