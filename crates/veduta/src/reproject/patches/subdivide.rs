@@ -313,7 +313,7 @@ impl<'a> Block<'a> {
         let axis = if sides <= tolerance || sides.is_infinite() {
             longer
         } else {
-            usize::from(off.along_x < CLEARLY * off.along_y)
+            usize::from(made.off.along_x < CLEARLY * made.off.along_y)
         };
         // A short side is left as it is when the other one may still help.
         let axis = if (cell.max - cell.min)[axis] <= LEAST_SIDE {
