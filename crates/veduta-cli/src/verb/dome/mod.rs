@@ -138,6 +138,9 @@ struct Seen {
     missing: Vec<(String, f64)>,
 }
 
+/// Pictures of one eye, and of which side each is.
+type Pictures = Vec<(Option<Side>, Picture)>;
+
 impl Dome {
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         let output = self.output.file()?.to_owned();
@@ -158,8 +161,8 @@ impl Dome {
             let written = self
                 .start
                 .map_or(number, |start| start.saturating_add(done as u32));
-            match self.frame(&mut run, number, written, talk) {
-                Ok(row) => rows.push(row),
+            match self.frame(&mut run, number, talk) {
+                Ok(made) => rows.push(self.write(&run, number, written, made)?),
                 Err(failure) if run.is_sequence && is_of_a_frame(failure.code) => {
                     talk.warn(format!("frame {number}: {failure}"));
                     failed.push((number, failure.to_string()));
@@ -304,45 +307,48 @@ impl Dome {
         target.ok_or_else(|| Failure::new(Code::Usage, "a dome is written by -o FILE"))
     }
 
-    /// Makes the pictures of a frame; what to tell of it.
+    /// Makes the pictures of a frame: for each file's eye those of its sides, or one.
     fn frame(
         &self,
         run: &mut Run<'_>,
         number: u32,
-        written: u32,
         talk: &mut Talk,
-    ) -> Result<Value, Failure> {
-        let Run {
-            eyes,
-            names,
-            format,
-            ..
-        } = run;
+    ) -> Result<Vec<Pictures>, Failure> {
         let mut made = Vec::new();
-        for eye in eyes.iter_mut() {
-            made.push(self.eye(eye, *format, number, talk)?);
+        for eye in &mut run.eyes {
+            made.push(self.eye(eye, run.format, number, talk)?);
         }
+        let (Some(how), [_, _]) = (self.aim.stereo(), made.as_slice()) else {
+            return Ok(made);
+        };
+        let [right, left] = [made.pop(), made.pop()].map(Option::unwrap_or_default);
+        let joined = left.into_iter().zip(right);
+        let joined = joined.map(|((side, left), (_, right))| {
+            if [left.width, left.height] != [right.width, right.height] {
+                let message = "the views of both eyes have different sizes, and so have their pictures; \
+                    tell --size";
+                return Err(Failure::new(Code::Usage, message));
+            }
+            Ok((side, target::both(left, &right, how)))
+        });
+        Ok(vec![joined.collect::<Result<_, _>>()?])
+    }
+
+    /// Writes the pictures of a frame; what to tell of it.
+    fn write(
+        &self,
+        run: &Run<'_>,
+        number: u32,
+        written: u32,
+        made: Vec<Pictures>,
+    ) -> Result<Value, Failure> {
         let mut paths = Vec::new();
-        let stereo = self.aim.stereo();
-        if let (Some(how), [_, _]) = (stereo, made.as_slice()) {
-            let [right, left] = [made.pop(), made.pop()].map(Option::unwrap_or_default);
-            let joined = left.into_iter().zip(right);
-            let joined = joined.map(|((side, left), (_, right))| {
-                if [left.width, left.height] != [right.width, right.height] {
-                    let message = "the views of both eyes have different sizes, and so have their pictures; \
-                        tell --size";
-                    return Err(Failure::new(Code::BadInput, message));
-                }
-                Ok((side, target::both(left, &right, how)))
-            });
-            made.push(joined.collect::<Result<_, _>>()?);
-        }
-        for (eye, pictures) in eyes.iter().zip(made) {
+        for (eye, pictures) in run.eyes.iter().zip(made) {
             let seen = eye.seen.as_ref().expect("a frame was made of it");
             // Two eyes in one picture are what no tag tells.
-            let panorama = seen.made.panorama.filter(|_| stereo.is_none());
+            let panorama = seen.made.panorama.filter(|_| self.aim.stereo().is_none());
             for (side, picture) in pictures {
-                let path = target::file(names, written, eye.name, side);
+                let path = target::file(&run.names, written, eye.name, side);
                 let target = self.target(&path)?.of_panorama(panorama);
                 let (width, height) = (picture.width, picture.height);
                 target.refuse_size(Size { width, height })?;
@@ -360,7 +366,7 @@ impl Dome {
         format: PictureFormat,
         number: u32,
         talk: &mut Talk,
-    ) -> Result<Vec<(Option<Side>, Picture)>, Failure> {
+    ) -> Result<Pictures, Failure> {
         let frame = match &eye.files {
             Some(files) => Some(self.source.read(files, number, self.strict, talk)?),
             None => None,
@@ -393,7 +399,7 @@ impl Dome {
             }
         };
         let made = seen.geometry.pictures(&pictures);
-        let mut made: Vec<(Option<Side>, Picture)> = seen
+        let mut made: Pictures = seen
             .made
             .pictures
             .iter()
