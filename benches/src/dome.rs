@@ -10,7 +10,7 @@ use veduta::accumulate::Picture;
 use veduta::filter::ewa::plain::{self, Ellipse, WeightTable};
 use veduta::filter::ewa::{Ewa, Profile};
 use veduta::geometry::{DVec2, DVec3};
-use veduta::reproject::{Lens, Orientation, Projection, Reprojection, Views};
+use veduta::reproject::{Lens, Need, Orientation, Projection, Reprojection, Views};
 
 /// Points a side of a texel, and of a pixel of the references.
 const SAMPLES: u32 = 4;
@@ -191,17 +191,18 @@ impl Job {
             profile,
             ..Ewa::default()
         };
-        let texels = self.texels();
+        let planar = |face: Vec<[u8; 3]>| [0, 1, 2].map(|k| face.iter().map(|t| t[k]).collect());
+        let faces: Vec<[Vec<u8>; 3]> = self.texels().into_iter().map(planar).collect();
         let work = || {
             let (sources, target) = (self.sources(), self.target());
             let start = ProcessTime::now();
             let reprojection = Reprojection::new(&sources, &target, &ewa);
             let map = start.elapsed().as_secs_f64();
-            let mut views = reprojection.views(true);
+            let (mut views, needs) = (reprojection.views(true), reprojection.needs());
             let (mut prepare, mut filter, mut wall) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
             for _ in 0..4 {
                 let start = ProcessTime::now();
-                fill(&mut views, &texels);
+                fill(&mut views, &faces, &needs);
                 views.complete();
                 prepare = start.elapsed().as_secs_f64().min(prepare);
                 let (start, begin) = (ProcessTime::now(), std::time::Instant::now());
@@ -318,21 +319,25 @@ fn mean(samples: u32, value: impl Fn(DVec2) -> [f64; 3]) -> [f64; 3] {
     sum
 }
 
-/// From 8 bits to planes, face by face.
-fn fill(views: &mut Views, texels: &[Vec<[u8; 3]>]) {
-    for (index, face) in texels.iter().enumerate() {
+/// From planes of 8 bits to those of views, but for views of which nothing is needed.
+fn fill(views: &mut Views, faces: &[[Vec<u8>; 3]], needs: &[Need]) {
+    for (index, face) in faces.iter().enumerate() {
+        if needs[index].window.is_none() {
+            continue;
+        }
         let planes = views.planes_mut(index);
-        let width = planes.width() as usize;
+        let (width, height) = (planes.width() as usize, planes.height() as usize);
         for mut row in planes.rows_mut() {
-            let Some(texels) = usize::try_from(row.number())
+            let Some(number) = usize::try_from(row.number())
                 .ok()
-                .and_then(|row| face.chunks(width).nth(row))
+                .filter(|&row| row < height)
             else {
                 continue;
             };
-            for channel in 0..3 {
+            for (channel, texels) in face.iter().enumerate() {
+                let texels = &texels[number * width..(number + 1) * width];
                 for (sample, texel) in row.channel(channel).iter_mut().zip(texels) {
-                    *sample = f32::from(texel[channel]) * (1.0 / 255.0);
+                    *sample = f32::from(*texel) * (1.0 / 255.0);
                 }
             }
         }

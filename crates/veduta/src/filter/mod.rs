@@ -15,6 +15,8 @@
 //!     .-------.-------.-------.
 //! ```
 //!
+//! Textures and views are filtered the other way round, from pixels to texels: [`ewa`], on [`Planes`].
+//!
 //! Kernels sum to 1 over all pixels at any point ([`Kernel`]): no point of the scene counts more than another,
 //! however it lies to the pixels, and what a picture sums up to does not depend on the filter.
 
@@ -23,7 +25,7 @@ mod kernel;
 mod planes;
 
 pub use kernel::{CellKernel, Kernel};
-pub use planes::{Planes, RowMut};
+pub use planes::{Planes, RowMut, Wrap};
 
 /// A pixel filter.
 ///

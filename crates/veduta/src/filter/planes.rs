@@ -156,6 +156,24 @@ impl Planes {
             })
     }
 
+    /// Fills the apron of a texture that goes on beyond its borders by rules of its own, along columns and along rows.
+    pub fn continue_by(&mut self, [across, down]: [Wrap; 2]) {
+        let (columns, rows) = (self.columns(), self.rows());
+        let (width, height) = (self.width as i32, self.height as i32);
+        for row in rows {
+            for column in columns.clone() {
+                if (0..width).contains(&column) && (0..height).contains(&row) {
+                    continue;
+                }
+                let texel = match (across.texel(column, width), down.texel(row, height)) {
+                    (Some(column), Some(row)) => self.texel(column, row),
+                    _ => [0.0; 4],
+                };
+                self.set(column, row, texel);
+            }
+        }
+    }
+
     /// The picture at half the size: each texel the mean of 4 x 4 with weights 1 3 3 1, which is smooth enough
     /// that footprints of a few texels tell no difference.
     ///
@@ -186,6 +204,34 @@ impl Planes {
             }
         }
         half
+    }
+}
+
+/// What a texture shows beyond its border.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrap {
+    /// The texture again.
+    Repeat,
+    /// The texture again, every other time turned over.
+    Mirror,
+    /// The texels of the border.
+    Clamp,
+    /// Nothing: black, and transparent where there is opacity.
+    Black,
+}
+
+impl Wrap {
+    /// The texel, of `size`, that is shown at a number beyond them.
+    fn texel(self, k: i32, size: i32) -> Option<i32> {
+        match self {
+            Self::Repeat => Some(k.rem_euclid(size)),
+            Self::Mirror => {
+                let k = k.rem_euclid(2 * size);
+                Some(k.min(2 * size - 1 - k))
+            }
+            Self::Clamp => Some(k.clamp(0, size - 1)),
+            Self::Black => (0..size).contains(&k).then_some(k),
+        }
     }
 }
 
@@ -245,6 +291,24 @@ mod tests {
                     [column as f32, row as f32, 1.0, 0.5]
                 };
                 assert_eq!(planes.texel(column, row), expected, "{column} {row}");
+            }
+        }
+    }
+
+    #[test]
+    fn textures_go_on_as_they_are_told() {
+        for (wrap, expected) in [
+            (Wrap::Repeat, [2.0, 3.0, 1.0, 2.0, 3.0, 1.0, 2.0]),
+            (Wrap::Mirror, [2.0, 1.0, 1.0, 2.0, 3.0, 3.0, 2.0]),
+            (Wrap::Clamp, [1.0, 1.0, 1.0, 2.0, 3.0, 3.0, 3.0]),
+            (Wrap::Black, [0.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0]),
+        ] {
+            let mut planes = Planes::new(3, 1, 1, 2);
+            planes.set_row(0, &[1.0, 2.0, 3.0].map(|x| [x; 4]));
+            planes.continue_by([wrap, Wrap::Clamp]);
+            for row in planes.rows() {
+                let found: Vec<f32> = planes.columns().map(|k| planes.texel(k, row)[0]).collect();
+                assert_eq!(found, expected, "{wrap:?}");
             }
         }
     }
