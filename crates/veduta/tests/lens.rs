@@ -281,7 +281,7 @@ fn patches_show_everything_where_it_is() {
             worst[1] < 8.0 * TOLERANCE,
             "{name}: off by {worst:?} pixels"
         );
-        assert!(worst[0] > 0.0, "{name}: no patch was looked at");
+        assert!(worst != [0.0; 2], "{name}: no patch was looked at");
     }
 }
 
@@ -440,20 +440,18 @@ fn a_wire_stays_a_wire() {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), p| {
                     (l.min(p.x), r.max(p.x))
                 });
-            let mut columns = 0;
+            let (mut columns, mut worst) = (0, 0.0_f64);
             for column in left.ceil() as u32 + 1..right.floor() as u32 - 1 {
                 let expected = area_in_columns(&outline, f64::from(column), f64::from(column + 1));
                 let found: f64 = (0..height)
                     .map(|row| f64::from(picture.pixels[(row * width + column) as usize][3]))
                     .sum();
-                let off = (found / expected - 1.0).abs();
-                assert!(
-                    off < 0.01,
-                    "{name} {width}, column {column}: {found} and not {expected}"
-                );
+                worst = worst.max((found / expected - 1.0).abs());
                 columns += 1;
             }
+            println!("{name} {width}: off by {worst:.5} in a column");
             assert!(columns > width / 4, "{name}: the wire is {columns} long");
+            assert!(worst < 0.01, "{name} {width}: off by {worst} in a column");
         }
     }
 }

@@ -13,10 +13,13 @@ pub const TOLERANCE: f64 = 1.0 / 64.0;
 /// either side between. Poles and the rims of balls need most of these.
 const TOLERANCE_WITHIN_PIXEL: f64 = 1.0 / 16.0;
 
-/// How far from its place anything may be seen in a patch larger than a pixel, by the patch's size. The local scale
-/// is off by up to nine times as much in a corner of a patch, and with it the brightness of wires; on average it is right.
+/// In patches up to this size several of them average in a pixel, so that its scale matters no more; in pixels.
+const STRAIGHT_ENOUGH_SIDE: f64 = 0.5;
+
+/// How far from its place anything may be seen in a larger patch, by the patch's size. The local scale
+/// is off by up to sixteen times as much in a corner of a patch, and with it the brightness of wires; on average it is right.
 /// Where a lens stretches what it shows, as panoramas do towards their poles, it may be off by as much more.
-const LEAST_STRAIGHTNESS: f64 = 1.0 / 1200.0;
+const LEAST_STRAIGHTNESS: f64 = 1.0 / 1600.0;
 
 /// An arc of angle t whose directions are mixed linearly is right in its middle, and off by about 0.021 t^3 at its
 /// quarters; the lens itself may add as much again. Larger makes more patches in small pictures, in others
@@ -295,11 +298,14 @@ impl<'a> Block<'a> {
     /// Makes two patches of a cell if the lens is straight enough in it, else divides it.
     fn cut_straight(&mut self, cell: &Cell, longer: usize, patches: &mut Vec<Patch>) {
         let side = (cell.max - cell.min)[longer];
-        let tolerance = match side {
-            side if side > 1.0 => TOLERANCE.min(LEAST_STRAIGHTNESS * cell.stretch() * side),
-            1.0 => TOLERANCE,
-            _ => TOLERANCE_WITHIN_PIXEL,
+        let mut tolerance = if side < 1.0 {
+            TOLERANCE_WITHIN_PIXEL
+        } else {
+            TOLERANCE
         };
+        if side > STRAIGHT_ENOUGH_SIDE {
+            tolerance = tolerance.min(LEAST_STRAIGHTNESS * cell.stretch() * side);
+        }
         let mut made = cell.two_patches(false);
         let sides = made.off.along_x.max(made.off.along_y);
         // The sides are the same whichever the diagonal.
@@ -523,16 +529,20 @@ impl Cell {
         TwoPatches { triangles, off }
     }
 
-    /// How much longer than wide a small round thing is shown, if along x or y.
+    /// How much longer than wide a small round thing is shown.
     fn stretch(&self) -> f64 {
         let size = self.max - self.min;
         let along = |ends: [Option<DVec3>; 2], length: f64| match ends {
-            [Some(a), Some(b)] => (b - a).length() / length,
-            _ => 0.0,
+            [Some(a), Some(b)] => (b - a) / length,
+            _ => DVec3::ZERO,
         };
         let x = along([self.directions[1][0], self.directions[1][2]], size.x);
         let y = along([self.directions[0][1], self.directions[2][1]], size.y);
-        let stretch = x.max(y) / x.min(y);
+        // The ratio of the singular values of the two, as columns.
+        let (xx, yy, xy) = (x.length_squared(), y.length_squared(), x.dot(y));
+        let (mean, difference) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+        let root = difference.hypot(xy);
+        let stretch = ((mean + root) / (mean - root)).sqrt();
         if stretch.is_finite() { stretch } else { 1.0 }
     }
 
