@@ -21,13 +21,13 @@ pub struct Filtering {
 /// `--kernel`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Kernel {
-    /// Sharp where views are magnified, gaussian where they are reduced
+    /// Robidoux where views are magnified, gaussian where they are reduced
     Auto,
     /// That of Greene & Heckbert: soft, and nothing gets darker or brighter than the views are
     Gaussian,
-    /// As sharp as pixels of exact area
+    /// As sharp as pixels of exact area, with dark lines beside bright edges
     Sharp,
-    /// ImageMagick's
+    /// ImageMagick's: nearly as sharp, and edges stay clean
     Robidoux,
     /// Mitchell & Netravali's
     Mitchell,

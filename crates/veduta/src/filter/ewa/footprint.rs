@@ -1,7 +1,7 @@
 use super::lanes::{LANES, Vector};
 use super::{Ewa, Profile};
 
-/// The Gaussian alone above, the sharp profile alone below, of the squared minor radius of a footprint in texels.
+/// The Gaussian alone above, the round profile alone below, of the squared minor radius of a footprint in texels.
 const BLEND: [f32; 2] = [1.5, 3.0];
 
 /// Ellipses of eight pixels in the texture: where each lies, how far it reaches, and its equation.
@@ -16,8 +16,8 @@ pub(crate) struct Footprints {
     /// First column and row inside, and how many there may be, from the base.
     pub first: [[i32; LANES]; 2],
     pub count: [[i32; LANES]; 2],
-    /// Share of the sharp profile.
-    pub sharp: [f32; LANES],
+    /// Share of the profile of radius 2.
+    pub round: [f32; LANES],
     /// Largest half extent of the box around, texels.
     pub reach: [f32; LANES],
     /// Squared minor radius of the pixel in the texture before anything is added, texels.
@@ -49,7 +49,7 @@ impl Footprints {
         let spread = half.mul_add(half, s12 * s12).sqrt();
         let major = mean + spread;
         let minor = (mean - spread).max(zero);
-        let sharp = match ewa.profile {
+        let round = match ewa.profile {
             Profile::Auto => {
                 let [low, high] = BLEND;
                 let share = (all(high) - minor) * all(1.0 / (high - low));
@@ -58,14 +58,14 @@ impl Footprints {
             Profile::Gaussian => zero,
             _ => one,
         };
-        let subtracted = (one - sharp) * all(4.0 * variance);
+        let subtracted = (one - round) * all(4.0 * variance);
         let (n1, n2) = ((major - subtracted).max(one), (minor - subtracted).max(one));
         // The matrix with these eigenvalues and the same axes; a circle has no axes.
         let turn = ((n1 - n2) * all(0.5)).over(spread.max(all(1e-9)));
         let t11 = turn.mul_add(s11 - minor, n2);
         let t12 = turn * s12;
         let t22 = turn.mul_add(s22 - minor, n2);
-        let squared = zero.below(sharp, all(4.0), one);
+        let squared = zero.below(round, all(4.0), one);
         let scale = one.over(n1 * n2 * squared);
         // No closures from here on: what the compiler does not inline has no vector instructions.
         let [u, v] = centre;
@@ -78,7 +78,7 @@ impl Footprints {
             equation: [a.array(), b.array(), c.array()],
             first: [whole(first_u), whole(first_v)],
             count: [whole(count_u), whole(count_v)],
-            sharp: sharp.array(),
+            round: round.array(),
             reach: du.max(dv).array(),
             minor: minor.array(),
         }

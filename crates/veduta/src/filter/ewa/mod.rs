@@ -43,7 +43,7 @@ pub struct Ewa {
     /// larger than twice that use one. Smaller is quicker and less exact: 3 is good, 4 for masters. `None`: never,
     /// so that the cost of a pixel grows with its area in the texture.
     pub pyramid: Option<f32>,
-    /// Whether a mean is kept between the darkest and the lightest of its texels. The sharp profiles have lobes below
+    /// Whether a mean is kept between the darkest and the lightest of its texels. Those of radius 2 have lobes below
     /// 0, which ring around lights far brighter than what is beside them. It costs as much again as the filter.
     pub clamp: bool,
 }
@@ -326,7 +326,7 @@ mod tests {
                     let [r, g, b, _] = levels[0].texel(column, row);
                     [r, g, b]
                 };
-                let printed = plain::mean(texel, &ellipse, plain::weights(profile, of.sharp[0]));
+                let printed = plain::mean(texel, &ellipse, plain::weights(profile, of.round[0]));
                 let printed = printed.expect("a texel inside");
                 let quick: [f32; 3] = ewa.sample(&levels, centre, steps);
                 for (quick, printed) in quick.into_iter().zip(printed) {

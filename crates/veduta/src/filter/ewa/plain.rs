@@ -38,9 +38,9 @@ impl WeightTable {
     }
 }
 
-/// The weights of a profile by the squared distance in radii of the filter, with the share `sharp` of the sharp profile
+/// The weights of a profile by the squared distance in radii of the filter, with the share `share` of the round profile
 /// where it mixes.
-pub fn weights(profile: Profile, sharp: f32) -> impl Fn(f64) -> f64 {
+pub fn weights(profile: Profile, share: f32) -> impl Fn(f64) -> f64 {
     static GAUSSIAN: OnceLock<WeightTable> = OnceLock::new();
     static SHARP: OnceLock<WeightTable> = OnceLock::new();
     static ROBIDOUX: OnceLock<WeightTable> = OnceLock::new();
@@ -51,14 +51,14 @@ pub fn weights(profile: Profile, sharp: f32) -> impl Fn(f64) -> f64 {
         cell.get_or_init(|| WeightTable::new(weight))
     }
     let round = match profile {
-        Profile::Robidoux => table(&ROBIDOUX, Round::ROBIDOUX),
+        Profile::Sharp => table(&SHARP, Round::SHARP),
         Profile::Mitchell => table(&MITCHELL, Round::MITCHELL),
-        _ => table(&SHARP, Round::SHARP),
+        _ => table(&ROBIDOUX, Round::ROBIDOUX),
     };
     let gaussian = table(&GAUSSIAN, Gaussian);
-    let [of_round, of_gaussian] = Mixture::new(sharp).shares().map(f64::from);
+    let [of_round, of_gaussian] = Mixture::new(share).shares().map(f64::from);
     // Of a mixture, the Gaussian ends at half of the radius.
-    let squeezed = if sharp > 0.0 { 4.0 } else { 1.0 };
+    let squeezed = if share > 0.0 { 4.0 } else { 1.0 };
     move |q| {
         let near = squeezed * q;
         let bell = if near < 1.0 { gaussian.at(near) } else { 0.0 };
@@ -120,7 +120,7 @@ pub(super) fn around<const C: usize>(
 ) -> [f32; C] {
     let equation = footprints.equation.map(|lanes| f64::from(lanes[0]));
     let ellipse = Ellipse { centre, equation };
-    let weights = weights(ewa.profile, footprints.sharp[0]);
+    let weights = weights(ewa.profile, footprints.round[0]);
     let (width, rows) = (planes.width() as i32, planes.rows());
     let texel = |column: i32, row: i32| {
         let row = row.clamp(rows.start, rows.end - 1);

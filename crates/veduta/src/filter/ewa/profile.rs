@@ -6,13 +6,14 @@ use super::lanes::Vector;
 /// where it ends. So no root is taken of any texel's distance (Greene & Heckbert index their table in the same way).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Profile {
-    /// Sharp where the picture is magnified or as fine as its source, the Gaussian where it is reduced, and a mixture
-    /// in between: what to take unless one knows better.
+    /// Robidoux' where the picture is magnified or as fine as its source, the Gaussian where it is reduced, and a
+    /// mixture in between: what to take unless one knows better.
     #[default]
     Auto,
     /// The paper's `exp(-2 q)`: no lobes below 0, soft.
     Gaussian,
-    /// A profile of radius 2 fitted to give back box pixels from box texels.
+    /// A profile of radius 2 fitted to give back box pixels from box texels. Its lobes below 0 are seen in linear light as
+    /// dark lines beside bright edges.
     Sharp,
     /// Robidoux' cubic (B = 0.3782, C = 0.3109) as a radial function of radius 2: ImageMagick's default.
     Robidoux,
@@ -106,29 +107,29 @@ impl Round {
     }
 }
 
-/// Part [`Round::SHARP`], part [`Gaussian`], each of integral 1 before.
+/// Part [`Round::ROBIDOUX`], part [`Gaussian`], each of integral 1 before.
 #[derive(Clone, Copy)]
 pub(crate) struct Mixture {
-    sharp: f32,
+    round: f32,
     gaussian: f32,
 }
 
 impl Mixture {
-    /// With `share` of the sharp profile, 0 to 1.
+    /// With `share` of the round profile, 0 to 1.
     #[inline(always)]
     pub fn new(share: f32) -> Self {
-        const SHARP: f32 = 1.0 / (Round::RADIUS_SQUARED * Round::SHARP.integral());
+        const ROUND: f32 = 1.0 / (Round::RADIUS_SQUARED * Round::ROBIDOUX.integral());
         Self {
-            sharp: share * SHARP,
+            round: share * ROUND,
             gaussian: (1.0 - share) / GAUSSIAN_INTEGRAL,
         }
     }
 }
 
 impl Mixture {
-    /// Factors of [`Round::SHARP`] and of the Gaussian.
+    /// Factors of [`Round::ROBIDOUX`] and of the Gaussian.
     pub fn shares(&self) -> [f32; 2] {
-        [self.sharp, self.gaussian]
+        [self.round, self.gaussian]
     }
 }
 
@@ -137,8 +138,8 @@ impl Weigh for Mixture {
 
     #[inline(always)]
     fn weights<V: Vector>(&self, token: V::Token, q: V) -> V {
-        let sharp = Round::SHARP.weights(token, q) * V::all(token, self.sharp);
+        let round = Round::ROBIDOUX.weights(token, q) * V::all(token, self.round);
         let near = gaussian(token, q * V::all(token, Self::RADIUS_SQUARED));
-        near.mul_add(V::all(token, self.gaussian), sharp)
+        near.mul_add(V::all(token, self.gaussian), round)
     }
 }

@@ -17,7 +17,7 @@ pub(crate) fn mean<V: Vector, const C: usize>(
     lane: usize,
 ) -> [f32; C] {
     let mean = unclamped::<V, C>(token, ewa, planes, base, footprints, lane);
-    if ewa.clamp && footprints.sharp[lane] > 0.0 {
+    if ewa.clamp && footprints.round[lane] > 0.0 {
         return clamped(mean, planes, base, footprints, lane);
     }
     mean
@@ -32,17 +32,17 @@ fn unclamped<V: Vector, const C: usize>(
     footprints: &Footprints,
     lane: usize,
 ) -> [f32; C] {
-    let sharp = footprints.sharp[lane];
-    if sharp <= 0.0 {
+    let share = footprints.round[lane];
+    if share <= 0.0 {
         return scan::<V, _, C>(token, &Gaussian, planes, base, footprints, lane);
     }
-    if sharp < 1.0 {
-        return scan::<V, _, C>(token, &Mixture::new(sharp), planes, base, footprints, lane);
+    if share < 1.0 {
+        return scan::<V, _, C>(token, &Mixture::new(share), planes, base, footprints, lane);
     }
     let round = match ewa.profile {
-        Profile::Robidoux => &Round::ROBIDOUX,
+        Profile::Sharp => &Round::SHARP,
         Profile::Mitchell => &Round::MITCHELL,
-        _ => &Round::SHARP,
+        _ => &Round::ROBIDOUX,
     };
     scan::<V, _, C>(token, round, planes, base, footprints, lane)
 }
