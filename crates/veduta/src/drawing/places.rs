@@ -48,7 +48,7 @@ impl Places {
                 let y = f64::from(border) / f64::from(self.cells) + beyond;
                 let share = ((y - top.y) / (bottom.y - top.y)).clamp(0.0, 1.0);
                 // Along the row all of it does.
-                (!share.is_nan()).then(|| top.x + share * (bottom.x - top.x))
+                (!share.is_nan()).then_some(top.x + share * (bottom.x - top.x))
             };
             let [one, other] = match (x_at(row, -margin), x_at(row + 1, margin)) {
                 (Some(one), Some(other)) => [one, other],
