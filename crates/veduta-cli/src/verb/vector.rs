@@ -268,8 +268,10 @@ fn uneven_shapes(drawing: &Drawing) -> usize {
 fn radiances(drawing: &mut Drawing) -> impl Iterator<Item = &mut [f32; 3]> {
     let shapes = drawing.shapes.iter_mut().map(|shape| &mut shape.radiance);
     let veils = drawing.veils.iter_mut().map(|veil| &mut veil.radiance);
-    let beneath = drawing.underpainting.iter_mut();
-    let beneath = beneath.map(|beneath| &mut beneath.radiance);
+    let beneath = drawing.underpainting.iter_mut().flat_map(|beneath| {
+        let rims = beneath.rims.iter_mut().map(|rim| &mut rim.radiance);
+        rims.chain([&mut beneath.radiance])
+    });
     shapes.chain(veils).chain(beneath)
 }
 

@@ -4,7 +4,9 @@ use crate::OneFile;
 use roxmltree::{Document, Node};
 use serde_json::Value;
 use std::collections::BTreeSet;
-use veduta::drawing::{Drawing, Evenness, Group, LineKind, Shape, Stroke, Underpainting, Veil};
+use veduta::drawing::{
+    Chain, Drawing, Evenness, Group, LineKind, Rim, Shape, Stroke, Underpainting, Veil,
+};
 use veduta::map::{MaterialId, ObjectId};
 use veduta_geometry::{DVec2, signed_area};
 use veduta_io::{VectorFormat, VectorOptions, stream_drawing, write_drawing};
@@ -43,11 +45,20 @@ fn drawing() -> Drawing {
         points: square(1.0, 2.0),
         closed,
     };
+    let chain = |closed| Chain {
+        points: square(0.25, 9.5),
+        closed,
+    };
     Drawing {
-        underpainting: vec![Underpainting {
-            outlines: vec![square(5.0, 20.0)],
+        underpainting: Some(Underpainting {
+            outline: Some(vec![square(0.25, 9.5)]),
             radiance: [0.0, 1.0, 0.0],
-        }],
+            rims: vec![Rim {
+                radiance: [1.0, 0.0, 0.0],
+                chains: vec![chain(false), chain(true), chain(false)],
+            }],
+            rim_width: 3.0,
+        }),
         size: [20.0, 10.0],
         groups: vec![
             group("town", None, 0..0),
@@ -156,6 +167,9 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
     assert_eq!(
         names,
         [
+            "",
+            "underpainting",
+            "",
             "town",
             hard,
             "7 dwarfs",
@@ -174,15 +188,23 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
         .filter_map(|group| group.attribute("id"))
         .collect();
     assert_eq!(
-        ids[..5],
-        ["town", "a_b_c_d_", "_7_dwarfs", "town-2", "lines"]
+        ids[..6],
+        [
+            "underpainting",
+            "town",
+            "a_b_c_d_",
+            "_7_dwarfs",
+            "town-2",
+            "lines"
+        ]
     );
     let different: BTreeSet<&&str> = ids.iter().collect();
-    assert_eq!(different.len(), groups.len(), "{ids:?}");
+    // All but those of what is masked and of the rims have one.
+    assert_eq!(different.len(), groups.len() - 2, "{ids:?}");
     let depth = |node: &Node| node.ancestors().filter(|n| n.has_tag_name("g")).count();
     assert_eq!(
         groups.iter().map(depth).collect::<Vec<_>>(),
-        [1, 1, 2, 3, 2, 1, 1, 2, 1, 2, 2, 2]
+        [1, 2, 3, 2, 3, 4, 3, 2, 1, 2, 1, 2, 2, 2]
     );
 
     let paths: Vec<Node> = document
@@ -193,7 +215,8 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
     assert_eq!(
         fills,
         [
-            Some("#0f0"),
+            Some("#fff"),
+            None,
             Some("#ff8900"),
             Some("#fff"),
             Some("#00f"),
@@ -201,11 +224,17 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
             None,
             None
         ],
-        "the underpainting first, then shapes, veils, lines"
+        "the mask first, then rims, shapes, veils, lines"
     );
+    assert_eq!(groups[0].attribute("mask"), Some("url(#outline)"));
+    assert_eq!(groups[2].attribute("stroke-width"), Some("300"));
     let data = |index: usize| paths[index].attribute("d").expect("a path has data");
+    let rims = rings(data(1));
+    let expected = square(25.0, 950.0);
+    assert_eq!(rims, [&expected[..]; 3], "{}", data(1));
+    assert_eq!(data(1).matches('z').count(), 1);
     for (index, shape) in drawing().shapes.iter().enumerate() {
-        let found = rings(data(index + 1));
+        let found = rings(data(index + 2));
         assert_eq!(found.len(), shape.painted.len());
         for (found, outline) in found.iter().zip(&shape.painted) {
             // Hundredths of a pixel.
@@ -214,15 +243,15 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
         }
     }
     assert!(
-        !data(4).ends_with('z') && data(5).ends_with('z') && !data(6).ends_with('z'),
+        !data(5).ends_with('z') && data(6).ends_with('z') && !data(7).ends_with('z'),
         "one is closed"
     );
-    assert_eq!(paths[3].attribute("fill-opacity"), Some(".25"));
+    assert_eq!(paths[4].attribute("fill-opacity"), Some(".25"));
     let dashes = groups.iter().map(|group| {
         let of = |name| group.attribute(name);
         (of("stroke-width"), of("stroke-dasharray"))
     });
-    let dashes: Vec<_> = dashes.skip(8).collect();
+    let dashes: Vec<_> = dashes.skip(10).collect();
     assert_eq!(
         dashes,
         [
@@ -232,11 +261,9 @@ fn an_svg_holds_groups_with_names_and_paths_with_the_outlines() {
             (None, None)
         ]
     );
-    let background = document.descendants().find(|n| n.has_tag_name("rect"));
-    assert_eq!(
-        background.and_then(|rect| rect.attribute("fill")),
-        Some("#00f")
-    );
+    let rectangles = document.descendants().filter(|n| n.has_tag_name("rect"));
+    let fills: Vec<_> = rectangles.map(|rect| rect.attribute("fill")).collect();
+    assert_eq!(fills, [Some("#00f"), Some("#0f0")], "background, ground");
 }
 
 #[test]
@@ -256,23 +283,35 @@ fn a_pdf_has_a_layer_for_each_group() {
     let bytes = encoded("pdf", &VectorOptions::default());
     assert!(bytes.starts_with(b"%PDF-1.7") && bytes.ends_with(b"%%EOF"));
     let find = |what: &[u8]| bytes.windows(what.len()).position(|found| found == what);
-    let begin = find(b"stream\n").expect("a stream") + b"stream\n".len();
-    let content = miniz_oxide::inflate::decompress_to_vec_zlib(&bytes[begin..]).expect("Deflate");
-    let content = String::from_utf8(content).expect("text");
+    // Of the page, of what is masked, and of the mask.
+    let starts = bytes.windows(8).enumerate();
+    let starts = starts.filter(|(_, found)| found == b"\nstream\n");
+    let contents: Vec<String> = starts
+        .map(|(at, found)| {
+            let bytes = &bytes[at + found.len()..];
+            let text = miniz_oxide::inflate::decompress_to_vec_zlib(bytes).expect("Deflate");
+            String::from_utf8(text).expect("text")
+        })
+        .collect();
+    assert_eq!(contents.len(), 3);
+    assert!(contents[0].contains("q /Outline gs /Opaque Do Q\n"));
+    let content = contents.concat();
     let words = || content.split_ascii_whitespace();
     let count = |what: &str| words().filter(|word| *word == what).count();
     // Five groups, the veils and their object, the lines, and three kinds of them.
     assert_eq!((count("BDC"), count("EMC")), (11, 11));
-    assert_eq!((count("m"), count("h"), count("f")), (8, 5, 4));
-    assert_eq!((count("s"), count("S")), (1, 2));
+    assert_eq!((count("m"), count("h"), count("f")), (11, 5, 5));
+    assert_eq!((count("s"), count("S")), (2, 4));
     assert!(content.contains("q 0.5 w 0 J [6 1.5] 0 d\n"), "dashes");
-    assert_eq!((count("q"), count("Q")), (2, 2));
+    assert_eq!((count("q"), count("Q")), (4, 4));
     assert_eq!(count("/A250"), 1, "opacity");
     for what in [
         "/OCProperties",
         "/Type /OCG",
-        "/G7 13 0 R",
+        "/G7 16 0 R",
         "/ca 0.25",
+        "/S /Alpha",
+        "/S /Transparency",
         "/MediaBox [0 0 15 7.5]",
     ] {
         assert!(find(what.as_bytes()).is_some(), "{what}");

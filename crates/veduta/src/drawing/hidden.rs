@@ -9,7 +9,6 @@
 //! without the bookkeeping that saves looking at faces again).
 
 use super::lines::{JOINED, Judge, normal_of};
-use super::parts::{WHOLE, positive};
 use super::places::{Places, box_around};
 use super::{COINCIDENT, LineKind, is_on_frame};
 use rayon::prelude::*;
@@ -242,7 +241,7 @@ fn hidden_by(map: &VisibilityMap, edge: &Edge, face: FaceId) -> Option<[f64; 2]>
     if map.faces.is_veil(face) {
         return None;
     }
-    let mut part = WHOLE;
+    let mut part = [0.0, 1.0];
     let outline = map.faces.outline(face);
     for (k, &from) in outline.iter().enumerate() {
         let along = outline[(k + 1) % outline.len()] - from;
@@ -259,4 +258,21 @@ fn hidden_by(map: &VisibilityMap, edge: &Edge, face: FaceId) -> Option<[f64; 2]>
     let joined = JOINED * super::join::depth_unit(&map.camera, middle);
     // What is joined to the edge does not hide it.
     (nearer_at(part[0]).max(nearer_at(part[1])) > joined).then_some(part)
+}
+
+/// The part in which an affine function with these values at 0 and 1 is positive.
+fn positive([start, end]: [f64; 2], at_start: f64, at_end: f64) -> Option<[f64; 2]> {
+    let part = match (at_start > 0.0, at_end > 0.0) {
+        (true, true) => [start, end],
+        (false, false) => return None,
+        (starts, _) => {
+            let zero = at_start / (at_start - at_end);
+            if starts {
+                [start, end.min(zero)]
+            } else {
+                [start.max(zero), end]
+            }
+        }
+    };
+    (part[0] < part[1]).then_some(part)
 }

@@ -11,7 +11,7 @@
 //! 4. `order`: objects as a tree, painted far to near, as an illustrator expects. Regions do not overlap, so
 //!    that any order would do; within an object thin shapes come first.
 //! 5. `trap`: against seams, a shape reaches a little under those painted later.
-//! 6. `underpainting`: what lies below all of them, where they have no room for that.
+//! 6. `underpainting`: what lies below all of them, where they have no room for that, and their common outline.
 //! 7. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
 //! 8. `lines`: visible edges as strokes, and by `hidden` those that are not.
 //!
@@ -23,7 +23,6 @@ mod join;
 mod lines;
 mod near;
 mod order;
-mod parts;
 mod places;
 mod subdivision;
 mod trace;
@@ -38,7 +37,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use subdivision::Subdivision;
 use trap::{Reached, Trapper};
-use underpainting::{Covered, Painted, Strips};
+use underpainting::Outline;
 use veduta_geometry::{DVec2, signed_area};
 use veduta_map::{Camera, MaterialId, ObjectId, Projection, VisibilityMap};
 
@@ -129,8 +128,9 @@ pub enum LineKind {
 pub struct Drawing {
     /// Width and height of the picture in pixels.
     pub size: [f64; 2],
-    /// What is painted before all shapes, so that nothing else is seen between them.
-    pub underpainting: Vec<Underpainting>,
+    /// What is painted before all shapes, so that nothing else is seen between them; none without traps or
+    /// without shapes.
+    pub underpainting: Option<Underpainting>,
     /// The tree of objects, parents before children, in the order in which they are painted.
     pub groups: Vec<Group>,
     /// In the order in which they are painted, which is that of their groups.
@@ -143,13 +143,39 @@ pub struct Drawing {
     pub material_names: Vec<String>,
 }
 
-/// What lies under seams, in one colour: that of a shape there.
+/// What lies under all shapes, so that nothing behind the picture is seen between them.
+///
+/// Underpainting and shapes are to be laid on one another first and then shown through the outline as one
+/// picture (a mask, not a clip of each of them), so that viewers smooth it once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Underpainting {
-    /// Outlines and holes, wound as those of shapes are.
-    pub outlines: Vec<Vec<DVec2>>,
-    /// Radiance (linear Rec.709).
+    /// What is to be seen of it and of the shapes, not of veils and lines: outlines and holes of all that is
+    /// covered, wound as those of shapes are, a pixel beyond the frame. `None`, if that is the whole frame.
+    pub outline: Option<Vec<Vec<DVec2>>>,
+    /// The mean radiance of all shapes (linear Rec.709); it fills the frame.
     pub radiance: [f32; 3],
+    /// Strokes along the outline, laid on that.
+    pub rims: Vec<Rim>,
+    /// Their width in pixels.
+    pub rim_width: f64,
+}
+
+/// Where the border of a shape is the outline of all that is covered: strokes with round ends and joins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rim {
+    /// Radiance of the shape (linear Rec.709).
+    pub radiance: [f32; 3],
+    /// In pixels.
+    pub chains: Vec<Chain>,
+}
+
+/// A line from point to point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// Corners; the first is not repeated at the end.
+    pub points: Vec<DVec2>,
+    /// Whether the last point is joined to the first.
+    pub closed: bool,
 }
 
 /// A node of the tree of objects: one for each part of the objects' names between slashes.
@@ -281,7 +307,7 @@ fn shapes(
     looks: &[Look],
     grid: &PixelGrid,
     settings: &Settings,
-) -> (Vec<Group>, Vec<Shape>, Vec<Underpainting>) {
+) -> (Vec<Group>, Vec<Shape>, Option<Underpainting>) {
     let regions = join::join(map, subdivision, looks, settings.joining);
     let outlines: Vec<Outlines> = {
         let mut region_of = vec![0u32; looks.len()];
@@ -326,30 +352,18 @@ fn shapes(
             shape(map, looks, &regions[region as usize], group, seen, painted)
         })
         .collect();
-    let mut underpainting = Vec::new();
-    if settings.trap > 0.0 && !shapes.is_empty() {
-        let covered = Covered::of(subdivision, grid);
-        underpainting.push(Underpainting {
-            outlines: underpainting::ground(&covered),
+    let has_underpainting = settings.trap > 0.0 && !shapes.is_empty();
+    let underpainting = has_underpainting.then(|| {
+        let outline = Outline::of(subdivision, grid);
+        let half_width = RIM * settings.trap;
+        let rims = outline.rims(&rank, half_width);
+        Underpainting {
+            outline: (!outline.is_frame()).then(|| outline.polygons()),
             radiance: mean_radiance(&shapes),
-        });
-        let strips = underpainting::strips(&Painted {
-            subdivision,
-            rank: &rank,
-            shapes: &shapes,
-            covered: &covered,
-            grid,
-            depth: settings.trap * DEPTH,
-        });
-        underpainting.extend(
-            strips
-                .into_iter()
-                .map(|Strips { shape, outlines }| Underpainting {
-                    outlines,
-                    radiance: shapes[shape as usize].radiance,
-                }),
-        );
-    }
+            rims: of_shapes(rims, &shapes),
+            rim_width: 2.0 * half_width,
+        }
+    });
     (groups, shapes, underpainting)
 }
 
@@ -365,9 +379,34 @@ fn mean_radiance(shapes: &[Shape]) -> [f32; 3] {
     sum.map(|sum| if area > 0.0 { (sum / area) as f32 } else { 0.0 })
 }
 
-/// How far around seams, in reaches of traps, something has to lie below: with traps of 2 pixels as far as the
-/// diagonal of a pixel. Farther would fatten more of the outline.
-const DEPTH: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// The rims of each shape in one, in the order of shapes.
+fn of_shapes(rims: Vec<underpainting::Rim>, shapes: &[Shape]) -> Vec<Rim> {
+    let mut of_shapes: Vec<Rim> = Vec::new();
+    let mut last = None;
+    for underpainting::Rim {
+        shape,
+        points,
+        closed,
+    } in rims
+    {
+        if last != Some(shape) {
+            last = Some(shape);
+            of_shapes.push(Rim {
+                radiance: shapes[shape as usize].radiance,
+                chains: Vec::new(),
+            });
+        }
+        let own = of_shapes.last_mut();
+        own.expect("one was pushed")
+            .chains
+            .push(Chain { points, closed });
+    }
+    of_shapes
+}
+
+/// How far rims reach to both sides, in reaches of traps. With traps of 2 pixels that is the diagonal of a
+/// pixel and a quarter more, by which rims may be moved: all that the outline passes through is filled.
+const RIM: f64 = 0.875;
 
 /// Thickness in pixels of what is not painted: it would change no pixel by a step of 8 bits.
 const UNSEEN: f64 = 1.0 / 256.0;
@@ -490,12 +529,21 @@ fn shape(
 
 /// Whether a side of a fragment lies on the border of the picture.
 fn is_on_frame(ends: [DVec2; 2]) -> bool {
+    frame_side(ends).is_some()
+}
+
+/// The direction out of the picture, if a side of a fragment lies on its border.
+fn frame_side(ends: [DVec2; 2]) -> Option<DVec2> {
     // Points of the border may have become one with others beside it.
     let near = |axis: usize, border: f64| {
         ends.iter()
             .all(|end| (end[axis] - border).abs() <= 2.0 * COINCIDENT)
     };
-    (0..2).any(|axis| near(axis, 0.0) || near(axis, 1.0))
+    let sides = [(0, DVec2::X), (1, DVec2::Y)];
+    sides.into_iter().find_map(|(axis, outwards)| {
+        let is_first = near(axis, 0.0).then_some(-outwards);
+        is_first.or(near(axis, 1.0).then_some(outwards))
+    })
 }
 
 /// Depth in metres of what has that nearness.

@@ -29,7 +29,7 @@
 //! as if they were painted last: however thin a shape is, it would be seen, since the edges of what
 //! lies on top of it let a quarter of it through.
 //!
-//! What is left open all the same is found afterwards, by `underpainting`.
+//! What is left open all the same shows the `underpainting`.
 
 use super::subdivision::Subdivision;
 use super::{is_on_frame, trace};
@@ -67,7 +67,7 @@ const COINCIDENT: f64 = 1e-6;
 
 /// How far, in pixels, the sides of what is painted may be moved to make them straight: a tenth of the
 /// thousandth to which files are written. What is seen of shapes is not moved.
-const STRAIGHT: f64 = 1e-4;
+pub(super) const STRAIGHT: f64 = 1e-4;
 
 /// How near to an exit traps may come, in pixels. With more, traps would be missing in pixels that the
 /// exit does not touch; with less, thin shapes would look fat.

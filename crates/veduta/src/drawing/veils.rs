@@ -290,7 +290,7 @@ fn outlines(polygons: &[Vec<DVec2>], grid: &PixelGrid) -> Vec<Vec<DVec2>> {
 }
 
 /// The part of a convex polygon in which `half_plane` is at least zero (Sutherland & Hodgman, 1974).
-pub(super) fn clipped(polygon: &[DVec2], half_plane: &Affine) -> Vec<DVec2> {
+fn clipped(polygon: &[DVec2], half_plane: &Affine) -> Vec<DVec2> {
     let mut part = Vec::with_capacity(polygon.len() + 1);
     for (index, &here) in polygon.iter().enumerate() {
         let there = polygon[(index + 1) % polygon.len()];

@@ -18,7 +18,8 @@ use veduta::drawing::{Drawing, LineKind};
 /// What a drawing is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VectorFormat {
-    /// SVG 1.1: a group with id and title for each object, a path for each shape, the underpainting first.
+    /// SVG 1.1: a group with id and title for each object, a path for each shape, the underpainting first,
+    /// and a mask, the outline of all that is covered.
     #[cfg(feature = "svg")]
     Svg,
     /// PDF 1.7: an optional content group (a layer in viewers) for each object.

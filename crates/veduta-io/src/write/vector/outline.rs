@@ -68,10 +68,20 @@ impl Rounding {
 
     /// An open chain of points without repeated ones; `None` if one point is left.
     #[cfg(any(feature = "svg", feature = "pdf"))]
-    pub fn chain(self, points: &[DVec2]) -> Option<Vec<Point>> {
+    fn chain(self, points: &[DVec2]) -> Option<Vec<Point>> {
         let mut chain: Vec<Point> = points.iter().map(|&point| self.point(point)).collect();
         chain.dedup();
         (chain.len() > 1).then_some(chain)
+    }
+
+    /// [`Self::ring`] or [`Self::chain`].
+    #[cfg(any(feature = "svg", feature = "pdf"))]
+    pub fn line(self, points: &[DVec2], closed: bool) -> Option<Vec<Point>> {
+        if closed {
+            self.ring(points)
+        } else {
+            self.chain(points)
+        }
     }
 
     /// Appends a coordinate in decimals, as short as it can be.

@@ -4,7 +4,7 @@ use crate::deflate::deflate;
 use pdf_writer::{Array, Filter, Finish, Name, Pdf, Rect, Ref, TextStr};
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use veduta::drawing::{Drawing, LineKind, Underpainting};
+use veduta::drawing::{Chain, Drawing, LineKind, Rim, Underpainting};
 use veduta_geometry::DVec2;
 
 /// Points (1/72 inch) of a pixel, of which CSS has 96 to an inch.
@@ -17,13 +17,17 @@ const COMPRESSION: i32 = 9;
 /// the page within the marks of its group and of all around it shows when all of them are on.
 ///
 /// Colours are DeviceRGB, which viewers take for sRGB.
+///
+/// What is seen through the outline of the underpainting is a transparency group with a soft mask. A clip
+/// would be smoothed anew for each path within.
 pub fn encode(drawing: &Drawing, options: &VectorOptions) -> Vec<u8> {
     let mut layers = Layers::default();
-    let content = content(drawing, options, &mut layers);
-    let compressed = deflate(content.as_bytes(), COMPRESSION);
+    let Streams { page: text, masked } = streams(drawing, options, &mut layers);
+    let compressed = |text: &str| deflate(text.as_bytes(), COMPRESSION);
 
-    let [catalog, pages, page, stream, document] = [1, 2, 3, 4, 5].map(Ref::new);
-    let layer_ref = |index: usize| Ref::new(6 + index as i32);
+    let [catalog, pages, page, stream, document, group, mask, names] =
+        [1, 2, 3, 4, 5, 6, 7, 8].map(Ref::new);
+    let layer_ref = |index: usize| Ref::new(9 + index as i32);
     let mut pdf = Pdf::new();
     pdf.set_version(1, 7);
     {
@@ -43,20 +47,45 @@ pub fn encode(drawing: &Drawing, options: &VectorOptions) -> Vec<u8> {
         page.media_box(Rect::new(0.0, 0.0, width, height));
         page.contents(stream);
         let mut resources = page.resources();
-        let mut properties = resources.insert(Name(b"Properties")).dict();
-        for index in 0..layers.layers.len() {
-            properties.pair(Name(resource_name(index).as_bytes()), layer_ref(index));
+        resources.pair(Name(b"Properties"), names);
+        if masked.is_some() {
+            resources.x_objects().pair(Name(GROUP.as_bytes()), group);
         }
-        properties.finish();
         let mut states = resources.ext_g_states();
+        if masked.is_some() {
+            let mut state = states.insert(Name(MASK.as_bytes())).dict();
+            let mut soft_mask = state.insert(Name(b"SMask")).dict();
+            soft_mask.pair(Name(b"S"), Name(b"Alpha"));
+            soft_mask.pair(Name(b"G"), mask);
+        }
         for opacity in opacities(drawing) {
             let mut state = states.insert(Name(state_name(opacity).as_bytes())).dict();
             state.pair(Name(b"ca"), opacity as f32 / 1000.0);
         }
     }
-    pdf.stream(stream, &compressed)
+    pdf.stream(stream, &compressed(&text))
         .filter(Filter::FlateDecode)
         .finish();
+    if let Some(parts) = &masked {
+        for (reference, text) in [group, mask].into_iter().zip(parts) {
+            let compressed = compressed(text);
+            let mut form = pdf.form_xobject(reference, &compressed);
+            form.filter(Filter::FlateDecode);
+            let [width, height] = drawing.size.map(|side| side as f32);
+            form.bbox(Rect::new(0.0, 0.0, width, height));
+            let mut transparency = form.group();
+            transparency.transparency().isolated(true);
+            transparency.color_space().device_rgb();
+            transparency.finish();
+            form.resources().pair(Name(b"Properties"), names);
+        }
+    }
+    {
+        let mut properties = pdf.indirect(names).dict();
+        for index in 0..layers.layers.len() {
+            properties.pair(Name(resource_name(index).as_bytes()), layer_ref(index));
+        }
+    }
     {
         let mut told = pdf.document_info(document);
         told.producer(TextStr("Veduta"));
@@ -138,41 +167,40 @@ fn state_name(opacity: i64) -> String {
     format!("A{opacity}")
 }
 
-fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> String {
-    let mut content = Content {
-        text: String::new(),
-        rounding: Rounding::new(options.decimals),
-        fill: None,
-    };
+/// By which the page's content knows what is seen through the outline.
+const GROUP: &str = "Opaque";
+
+/// By which it knows the outline.
+const MASK: &str = "Outline";
+
+/// Content, not compressed.
+struct Streams {
+    page: String,
+    /// What is seen through the outline, and the outline, if there is one.
+    masked: Option<[String; 2]>,
+}
+
+fn streams(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> Streams {
+    let mut content = Content::new(options);
     let height = drawing.size[1] * POINTS_PER_PIXEL;
     // From here on in pixels, y downwards.
     content.push(format_args!(
         "{POINTS_PER_PIXEL} 0 0 -{POINTS_PER_PIXEL} 0 {height} cm\n"
     ));
     if let Some(color) = options.background {
-        content.fill(srgb8(color));
-        let [width, height] = drawing.size;
-        content.push(format_args!("0 0 {width} {height} re f\n"));
+        content.frame(drawing.size, color);
     }
-    for Underpainting { outlines, radiance } in &drawing.underpainting {
-        content.shape(outlines, *radiance);
-    }
-    let mut open: Vec<u32> = Vec::new();
-    for (index, group) in (0u32..).zip(&drawing.groups) {
-        while open.last().copied() != group.parent {
-            open.pop();
-            content.text.push_str("EMC\n");
-        }
-        open.push(index);
-        // Layers and groups begin with the same rows.
-        let layer = layers.push(&group.name, group.parent.map(|parent| parent as usize));
-        content.begin_layer(layer);
-        for shape in &drawing.shapes[group.shapes.clone()] {
-            content.shape(&shape.painted, shape.radiance);
-        }
-    }
-    for _ in open {
-        content.text.push_str("EMC\n");
+    let beneath = drawing.underpainting.as_ref();
+    let outline = beneath.and_then(|beneath| beneath.outline.as_ref());
+    let masked = outline.map(|outline| {
+        let [mut group, mut mask] = [(); 2].map(|()| Content::new(options));
+        group.opaque(drawing, layers);
+        mask.shape(outline, [0.0; 3]);
+        content.push(format_args!("q /{MASK} gs /{GROUP} Do Q\n"));
+        [group.text, mask.text]
+    });
+    if masked.is_none() {
+        content.opaque(drawing, layers);
     }
     if !drawing.veils.is_empty() {
         content.veils(drawing, layers);
@@ -180,10 +208,13 @@ fn content(drawing: &Drawing, options: &VectorOptions, layers: &mut Layers) -> S
     if !drawing.strokes.is_empty() {
         content.lines(drawing, options, layers);
     }
-    content.text
+    Streams {
+        page: content.text,
+        masked,
+    }
 }
 
-/// The page's content (ISO 32000-1, 8 and 14.6).
+/// Content of the page or a part of it (ISO 32000-1, 8 and 14.6).
 struct Content {
     text: String,
     rounding: Rounding,
@@ -192,6 +223,58 @@ struct Content {
 }
 
 impl Content {
+    fn new(options: &VectorOptions) -> Self {
+        Self {
+            text: String::new(),
+            rounding: Rounding::new(options.decimals),
+            fill: None,
+        }
+    }
+
+    /// Underpainting and shapes.
+    fn opaque(&mut self, drawing: &Drawing, layers: &mut Layers) {
+        if let Some(underpainting) = &drawing.underpainting {
+            self.frame(drawing.size, underpainting.radiance);
+            self.rims(underpainting);
+        }
+        let mut open: Vec<u32> = Vec::new();
+        for (index, group) in (0u32..).zip(&drawing.groups) {
+            while open.last().copied() != group.parent {
+                open.pop();
+                self.text.push_str("EMC\n");
+            }
+            open.push(index);
+            // Layers and groups begin with the same rows.
+            let layer = layers.push(&group.name, group.parent.map(|parent| parent as usize));
+            self.begin_layer(layer);
+            for shape in &drawing.shapes[group.shapes.clone()] {
+                self.shape(&shape.painted, shape.radiance);
+            }
+        }
+        for _ in open {
+            self.text.push_str("EMC\n");
+        }
+    }
+
+    /// Fills the frame.
+    fn frame(&mut self, [width, height]: [f64; 2], radiance: [f32; 3]) {
+        self.fill(srgb8(radiance));
+        self.push(format_args!("0 0 {width} {height} re f\n"));
+    }
+
+    fn rims(&mut self, underpainting: &Underpainting) {
+        let width = underpainting.rim_width;
+        // Round caps and joins.
+        self.push(format_args!("q {width} w 1 J 1 j\n"));
+        for Rim { radiance, chains } in &underpainting.rims {
+            self.color(srgb8(*radiance), "RG");
+            for Chain { points, closed } in chains {
+                self.line(points, *closed);
+            }
+        }
+        self.text.push_str("Q\n");
+    }
+
     fn push(&mut self, text: std::fmt::Arguments) {
         // Writing to a string cannot fail.
         let _ = self.text.write_fmt(text);
@@ -267,15 +350,7 @@ impl Content {
                 self.push(format_args!("q {narrow} w 0 J [{dash} {gap}] 0 d\n"));
             }
             for stroke in strokes {
-                let (chain, end) = if stroke.closed {
-                    (self.rounding.ring(&stroke.points), "s\n")
-                } else {
-                    (self.rounding.chain(&stroke.points), "S\n")
-                };
-                if let Some(chain) = chain {
-                    self.path(&chain);
-                    self.text.push_str(end);
-                }
+                self.line(&stroke.points, stroke.closed);
             }
             if is_hidden {
                 self.text.push_str("Q\n");
@@ -283,6 +358,14 @@ impl Content {
             self.text.push_str("EMC\n");
         }
         self.text.push_str("EMC\n");
+    }
+
+    /// A stroke in the colour and width for them.
+    fn line(&mut self, points: &[DVec2], closed: bool) {
+        if let Some(chain) = self.rounding.line(points, closed) {
+            self.path(&chain);
+            self.text.push_str(if closed { "s\n" } else { "S\n" });
+        }
     }
 
     fn path(&mut self, points: &[Point]) {

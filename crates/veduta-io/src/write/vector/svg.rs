@@ -2,7 +2,7 @@ use super::outline::{Point, Rounding};
 use super::{VectorOptions, hidden_line, name_of_lines, srgb8, thousandths};
 use std::collections::HashSet;
 use std::fmt::Write;
-use veduta::drawing::{Drawing, LineKind, Underpainting};
+use veduta::drawing::{Chain, Drawing, LineKind, Rim, Underpainting};
 use veduta_geometry::DVec2;
 
 /// SVG text. Groups nest as names do; a path is a shape, in relative coordinates.
@@ -43,14 +43,22 @@ impl Svg {
                 "<rect width=\"{right}\" height=\"{bottom}\" fill=\"{color}\"/>\n"
             ));
         }
-        if !drawing.underpainting.is_empty() {
-            self.begin_group("underpainting");
-            for Underpainting { outlines, radiance } in &drawing.underpainting {
-                self.shape(outlines, *radiance);
-            }
+        let beneath = drawing.underpainting.as_ref();
+        if let Some(outline) = beneath.and_then(|beneath| beneath.outline.as_ref()) {
+            // Not a clip path: several viewers clip what lies within piece by piece, and show the outlines too
+            // opaque.
+            let id = self.id("outline");
+            self.push(format_args!(
+                "<mask id=\"{id}\" maskUnits=\"userSpaceOnUse\" x=\"0\" y=\"0\" \
+                 width=\"{right}\" height=\"{bottom}\">"
+            ));
+            self.shape(outline, [1.0; 3]);
+            self.push(format_args!("</mask>\n<g mask=\"url(#{id})\">\n"));
+            self.opaque(drawing);
             self.text.push_str("</g>\n");
+        } else {
+            self.opaque(drawing);
         }
-        self.groups(drawing);
         if !drawing.veils.is_empty() {
             self.veils(drawing);
         }
@@ -58,6 +66,40 @@ impl Svg {
             self.lines(drawing, options);
         }
         self.text.push_str("</svg>\n");
+    }
+
+    fn opaque(&mut self, drawing: &Drawing) {
+        if let Some(underpainting) = &drawing.underpainting {
+            self.underpainting(drawing.size, underpainting);
+        }
+        self.groups(drawing);
+    }
+
+    fn underpainting(&mut self, size: [f64; 2], underpainting: &Underpainting) {
+        self.begin_group("underpainting");
+        let [right, bottom] = size.map(|side| self.rounding.units(side));
+        let color = Color(srgb8(underpainting.radiance));
+        self.push(format_args!(
+            "<rect width=\"{right}\" height=\"{bottom}\" fill=\"{color}\"/>\n"
+        ));
+        let width = self.rounding.units(underpainting.rim_width);
+        self.push(format_args!(
+            "<g fill=\"none\" stroke-width=\"{width}\" stroke-linecap=\"round\" \
+             stroke-linejoin=\"round\">\n"
+        ));
+        for Rim { radiance, chains } in &underpainting.rims {
+            let color = Color(srgb8(*radiance));
+            self.push(format_args!("<path stroke=\"{color}\" d=\""));
+            // Relative to where the one before ended, or began if it is closed.
+            let mut start = [0, 0];
+            for Chain { points, closed } in chains {
+                if let Some(chain) = self.rounding.line(points, *closed) {
+                    start = self.path_from(start, &[chain], *closed);
+                }
+            }
+            self.text.push_str("\"/>\n");
+        }
+        self.text.push_str("</g>\n</g>\n");
     }
 
     fn groups(&mut self, drawing: &Drawing) {
@@ -135,12 +177,7 @@ impl Svg {
                 self.begin_group(name);
             }
             for stroke in strokes {
-                let chain = if stroke.closed {
-                    self.rounding.ring(&stroke.points)
-                } else {
-                    self.rounding.chain(&stroke.points)
-                };
-                if let Some(chain) = chain {
+                if let Some(chain) = self.rounding.line(&stroke.points, stroke.closed) {
                     self.text.push_str("<path d=\"");
                     self.path(&[chain], stroke.closed);
                     self.text.push_str("\"/>\n");
@@ -197,13 +234,15 @@ impl Svg {
 
     /// The data of a path: relative commands, with no more separators than needed.
     fn path(&mut self, rings: &[Vec<Point>], closed: bool) {
-        // `m` is relative to where the ring before began, since `z` goes back there.
-        let mut start = [0, 0];
+        self.path_from([0, 0], rings, closed);
+    }
+
+    /// Goes on with a path from where it is, and returns where it is then.
+    fn path_from(&mut self, mut start: Point, rings: &[Vec<Point>], closed: bool) -> Point {
         for ring in rings {
             self.text.push('m');
             self.numbers(&[ring[0][0] - start[0], ring[0][1] - start[1]], true);
-            start = ring[0];
-            let mut at = start;
+            let mut at = ring[0];
             // Pairs after `m` and `l` go on as lines.
             let mut is_line = true;
             for &point in &ring[1..] {
@@ -229,10 +268,14 @@ impl Svg {
                     }
                 }
             }
+            start = at;
             if closed {
                 self.text.push('z');
+                // It goes back there.
+                start = ring[0];
             }
         }
+        start
     }
 
     /// Appends numbers; `after_letter` says that nothing needs to part the first from what is there.
