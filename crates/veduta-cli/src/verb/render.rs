@@ -103,7 +103,7 @@ Examples:
       veduta render town.obj -o whole.veduta --self-contained
   A dome for a planetarium from a street, and all around as a panorama:
       veduta render town.obj --lens domemaster --eye 12,-8,1.7 -o dome.png
-      veduta render town.obj --lens equirect --eye 12,-8,1.7 --size 4096x2048 -o around.png
+      veduta render town.obj --lens equirect --eye 12,-8,1.7 -o around.png
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
