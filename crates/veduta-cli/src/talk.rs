@@ -109,6 +109,34 @@ impl Talk {
         self.warnings.push(message);
     }
 
+    /// Warns; if `strict`, fails with `code` instead.
+    pub fn warn_or_fail(
+        &mut self,
+        message: String,
+        strict: bool,
+        code: Code,
+    ) -> Result<(), Failure> {
+        if strict {
+            let message = format!("{message} (an error because of --strict)");
+            return Err(Failure::new(code, message));
+        }
+        self.warn(message);
+        Ok(())
+    }
+
+    /// The same for what may be found in each of many pictures, and is told once.
+    pub fn warn_once_or_fail(
+        &mut self,
+        message: String,
+        strict: bool,
+        code: Code,
+    ) -> Result<(), Failure> {
+        if !strict && self.warnings.contains(&message) {
+            return Ok(());
+        }
+        self.warn_or_fail(message, strict, code)
+    }
+
     /// Tells a detail, if the user wants details.
     pub fn detail(&mut self, message: std::fmt::Arguments<'_>) {
         self.clear_line();

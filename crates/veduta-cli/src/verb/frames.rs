@@ -162,14 +162,7 @@ impl Frames {
         super::refuse_no_model(&self.model)?;
         let loaded = scene.at(Moment::Frame(number))?;
         for warning in &loaded.warnings {
-            let message = warning.to_string();
-            if self.strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::BadInput, message));
-            }
-            if !talk.warnings().contains(&message) {
-                talk.warn(message);
-            }
+            talk.warn_once_or_fail(warning.to_string(), self.strict, Code::BadInput)?;
         }
         Ok(loaded)
     }

@@ -98,11 +98,7 @@ impl Depths {
         let loaded = read_guest(&input.path, &options)?;
         for warning in &loaded.warnings {
             let message = format!("{}: {warning}", input.path.display());
-            if strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::BadInput, message));
-            }
-            talk.warn(message);
+            talk.warn_or_fail(message, strict, Code::BadInput)?;
         }
         Ok(loaded)
     }

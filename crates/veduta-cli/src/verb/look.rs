@@ -154,11 +154,7 @@ impl Look {
                 let loaded = read_picture(path)?;
                 for warning in loaded.warnings {
                     let message = format!("{}: {warning}", path.display());
-                    if strict {
-                        let message = format!("{message} (an error because of --strict)");
-                        return Err(Failure::new(Code::BadInput, message));
-                    }
-                    talk.warn(message);
+                    talk.warn_or_fail(message, strict, Code::BadInput)?;
                 }
                 Backdrop::Picture(loaded.picture)
             }

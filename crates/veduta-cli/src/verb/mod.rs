@@ -154,11 +154,7 @@ fn load(
     let loaded = read_scene(path, options)?;
     talk.end();
     for warning in &loaded.warnings {
-        if strict {
-            let message = format!("{warning} (an error because of --strict)");
-            return Err(Failure::new(Code::BadInput, message));
-        }
-        talk.warn(warning.to_string());
+        talk.warn_or_fail(warning.to_string(), strict, Code::BadInput)?;
     }
     Ok(loaded)
 }
@@ -202,11 +198,7 @@ fn tell_shortcomings(
         other => format!("{file}: not shown as it should be: {other:?}"),
     }));
     for message in messages {
-        if strict {
-            let message = format!("{message} (an error because of --strict)");
-            return Err(Failure::new(Code::Unsupported, message));
-        }
-        talk.warn(message);
+        talk.warn_or_fail(message, strict, Code::Unsupported)?;
     }
     Ok(())
 }
@@ -238,11 +230,7 @@ fn tell_of_mattes(
     }
     for message in messages {
         let message = format!("{}: {message}", file.display());
-        if strict {
-            let message = format!("{message} (an error because of --strict)");
-            return Err(Failure::new(Code::Unsupported, message));
-        }
-        talk.warn(message);
+        talk.warn_or_fail(message, strict, Code::Unsupported)?;
     }
     Ok(())
 }

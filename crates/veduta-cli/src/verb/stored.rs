@@ -137,11 +137,7 @@ impl Changes {
     /// be done; if strict, fails.
     pub fn apply(&self, scene: &mut Scene, strict: bool, talk: &mut Talk) -> Result<(), Failure> {
         for warning in self.change(scene)? {
-            if strict {
-                let message = format!("{warning} (an error because of --strict)");
-                return Err(Failure::new(Code::BadInput, message));
-            }
-            talk.warn(warning.to_string());
+            talk.warn_or_fail(warning.to_string(), strict, Code::BadInput)?;
         }
         Ok(())
     }

@@ -246,12 +246,7 @@ fn tell_means(
         file.display(),
         drawing.shapes.len() + drawing.veils.len()
     );
-    if strict {
-        let message = format!("{message} (an error because of --strict)");
-        return Err(Failure::new(Code::Unsupported, message));
-    }
-    talk.warn(message);
-    Ok(())
+    talk.warn_or_fail(message, strict, Code::Unsupported)
 }
 
 /// How many shapes have the mean of several colours.

@@ -19,7 +19,7 @@ use crate::values::{Background, FrameRange, Size};
 use clap::{Args, ValueEnum};
 use geometry::{Filtering, Geometry};
 use serde_json::{Value, json};
-use source::{Files, Frame, Source, warn};
+use source::{Files, Frame, Source};
 use std::path::{Path, PathBuf};
 use target::{Aim, EYE, Made};
 use veduta::accumulate::Picture;
@@ -255,13 +255,13 @@ impl Dome {
             return Err(Failure::new(Code::Usage, message));
         }
         let several = are_numbered && self.frames.is_none_or(|frames| !frames.is_one());
-        if output.as_os_str() == "-" && (several || self.aim.is_cube() && output.as_os_str() == "-")
-        {
+        let to_stdout = output.as_os_str() == "-";
+        if to_stdout && (several || self.aim.is_cube()) {
             let message = "several pictures are files; name them with -o";
             return Err(Failure::new(Code::Usage, message));
         }
         // One picture may go to stdout.
-        let names = match output.as_os_str() == "-" {
+        let names = match to_stdout {
             true => FrameNames::of_input(output),
             false => FrameNames::of(output, several)?,
         };
@@ -447,7 +447,7 @@ impl Dome {
         let made = self.aim.made(finest, format)?;
         if let Some(frame) = frame {
             for doubt in doubts::of(&views, frame) {
-                warn(doubt, self.strict, talk)?;
+                talk.warn_once_or_fail(doubt, self.strict, Code::BadInput)?;
             }
         }
         let targets: Vec<_> = made
@@ -466,7 +466,7 @@ impl Dome {
             let message = format!(
                 "no view shows {what}, which is {share:.1} % of the picture and stays clear"
             );
-            warn(message, self.strict, talk)?;
+            talk.warn_once_or_fail(message, self.strict, Code::BadInput)?;
         }
         Ok(Seen {
             sizes,

@@ -237,7 +237,7 @@ impl Source {
             } = loaded?;
             for warning in warnings {
                 let name = frame.name(frame.pictures.len());
-                warn(format!("{name}: {warning}"), strict, talk)?;
+                talk.warn_once_or_fail(format!("{name}: {warning}"), strict, Code::BadInput)?;
             }
             frame.pictures.push(picture);
             frame.told.push(panorama);
@@ -441,16 +441,4 @@ fn strip_of(layout: &Layout) -> Option<&'static str> {
         .into_iter()
         .find(|(_, shape)| *shape == layout.shape());
     Some(found?.0)
-}
-
-/// Warns, or fails if `strict`.
-pub fn warn(message: String, strict: bool, talk: &mut Talk) -> Result<(), Failure> {
-    if strict {
-        let message = format!("{message} (an error because of --strict)");
-        return Err(Failure::new(Code::BadInput, message));
-    }
-    if !talk.warnings().contains(&message) {
-        talk.warn(message);
-    }
-    Ok(())
 }

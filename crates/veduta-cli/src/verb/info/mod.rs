@@ -137,11 +137,7 @@ impl Info {
         talk.end();
         for warning in &loaded.warnings {
             let message = format!("{}: {warning}", self.file.display());
-            if self.strict {
-                let message = format!("{message} (an error because of --strict)");
-                return Err(Failure::new(Code::BadInput, message));
-            }
-            talk.warn(message);
+            talk.warn_or_fail(message, self.strict, Code::BadInput)?;
         }
         Ok(picture_told(&loaded))
     }

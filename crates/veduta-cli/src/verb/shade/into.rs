@@ -256,11 +256,7 @@ fn read_old(
     }
     for warning in warnings {
         let message = format!("{file}: {warning}");
-        if strict {
-            let message = format!("{message} (an error because of --strict)");
-            return Err(Failure::new(Code::BadInput, message));
-        }
-        talk.warn(message);
+        talk.warn_or_fail(message, strict, Code::BadInput)?;
     }
     Ok(picture)
 }
