@@ -1,7 +1,7 @@
 mod lens;
 
 use super::deep::DeepTarget;
-use super::look::Look;
+use super::look::{Development, Look};
 use super::output::{Output, Target};
 use super::stored::{Stored, refuse_place, tell_work};
 use super::vector::{Subject, Vector, VectorTarget};
@@ -13,7 +13,7 @@ use crate::values::{self, FieldOfView, Size};
 use clap::Args;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use veduta::accumulate::Aovs;
+use veduta::accumulate::{Aovs, Picture};
 use veduta::dice::PixelGrid;
 use veduta::map::{self, Camera, Casters, Origin, Projection, SeenScene, Source};
 use veduta::pipeline::{self, RenderSettings, Rendered, Sampling, Step};
@@ -141,6 +141,50 @@ pub(super) struct View {
     pub(super) reading: Reading,
 }
 
+/// Where a picture goes: into a file, small into the terminal, or both.
+struct Places {
+    target: Option<Target>,
+    screen: Option<Screen>,
+}
+
+impl Places {
+    /// The size of what the terminal shows of a picture of that size.
+    fn preview_size(&self, size: Size) -> Option<[u32; 2]> {
+        let screen = self.screen?;
+        Some(screen.size_of(size.width, size.height))
+    }
+
+    /// Develops a picture that is asked for in that size, lets `write` write it, and shows it; the exposure in EV.
+    fn develop(
+        &self,
+        mut picture: Picture,
+        size: Size,
+        development: &Development,
+        talk: &mut Talk,
+        write: impl FnOnce(&Target, &Picture, &mut Talk) -> Result<(), Failure>,
+    ) -> Result<f32, Failure> {
+        talk.begin("developing");
+        // Before it is developed, since pictures are scaled in linear light.
+        let preview = self.preview_size(size);
+        let mut preview = preview.map(|[width, height]| scaled(&picture, width, height));
+        let mut ev = 0.0;
+        if let Some(target) = &self.target {
+            ev = development.develop(&mut picture, !target.linear);
+            write(target, &picture, talk)?;
+        }
+        if let (Some(screen), Some(preview)) = (self.screen, &mut preview) {
+            match &self.target {
+                Some(target) if !target.linear => development.develop_at(preview, ev, true),
+                _ => ev = development.develop(preview, true),
+            }
+            talk.end();
+            print_bytes(&screen.show(preview))?;
+        }
+        talk.end();
+        Ok(ev)
+    }
+}
+
 impl Render {
     /// Width and height in pixels where none are given.
     pub const USUAL_SIZE: [u32; 2] = [1280, 960];
@@ -179,19 +223,13 @@ impl Render {
         }
         let development = self.look.development(&scene, self.strict, talk)?;
 
-        let screen = self.output.preview.and_then(Screen::of);
-        if target.is_none() && screen.is_none() {
-            let message =
-                "nothing is shown: stdout is no terminal; --preview=blocks shows it there";
-            talk.warn(message.to_owned());
+        let Some(places) = self.places(target, talk) else {
             return Ok(());
-        }
-        let size = [size.width, size.height];
-        let preview_size = screen.map(|screen| screen.size_of(size[0], size[1]));
+        };
         // A preview alone is made in its own size: areas are exact in any.
-        let [width, height] = match (&target, preview_size) {
+        let [width, height] = match (&places.target, places.preview_size(size)) {
             (None, Some(preview_size)) => preview_size,
-            _ => size,
+            _ => [size.width, size.height],
         };
         let settings = RenderSettings {
             width,
@@ -202,7 +240,7 @@ impl Render {
             aovs: self.output.aovs(),
         };
         let Rendered {
-            mut picture,
+            picture,
             mut aovs,
             shortcomings,
         } = pipeline::render(&scene, &camera, &settings, |step| tell_step(step, talk));
@@ -213,40 +251,32 @@ impl Render {
                 *object = rows_before[*object as usize];
             }
         }
-        talk.begin("developing");
-        // Before it is developed, since pictures are scaled in linear light.
-        let mut preview = preview_size.map(|[width, height]| scaled(&picture, width, height));
-        let mut ev = 0.0;
-        if let Some(target) = &target {
-            ev = development.develop(&mut picture, !target.linear);
-            let layers = Layers {
-                aovs: &aovs,
-                scene: &scene,
-                camera: &camera,
-                grid: PixelGrid::of_frame(width, height),
-            };
-            tell_of_mattes(&self.model, &layers, self.strict, talk)?;
-            talk.begin("writing");
-            target.write(&picture, self.output.has_layers().then_some(&layers))?;
-        }
-        if let (Some(screen), Some(preview)) = (screen, &mut preview) {
-            match &target {
-                Some(target) if !target.linear => development.develop_at(preview, ev, true),
-                _ => ev = development.develop(preview, true),
-            }
-            talk.end();
-            print_bytes(&screen.show(preview))?;
-        }
-        talk.end();
+        let ev = places.develop(
+            picture,
+            size,
+            &development,
+            talk,
+            |target, picture, talk| {
+                let layers = Layers {
+                    aovs: &aovs,
+                    scene: &scene,
+                    camera: &camera,
+                    grid: PixelGrid::of_frame(width, height),
+                };
+                tell_of_mattes(&self.model, &layers, self.strict, talk)?;
+                talk.begin("writing");
+                target.write(picture, self.output.has_layers().then_some(&layers))
+            },
+        )?;
         talk.detail(format_args!(
             "{} faces, exposure {ev:.2} EV",
             scene.face_count()
         ));
 
-        if let (true, Some(target)) = (json, &target) {
+        if let (true, Some(target)) = (json, &places.target) {
             let told = serde_json::json!({
                 "output": target.name(),
-                "size": size,
+                "size": [size.width, size.height],
                 "faces": scene.face_count(),
                 "exposure": ev,
                 "warnings": talk.warnings(),
@@ -254,6 +284,18 @@ impl Render {
             print(&format!("{told}\n"))?;
         }
         Ok(())
+    }
+
+    /// Where the picture goes; `None`, with a warning, if it would be seen nowhere.
+    fn places(&self, target: Option<Target>, talk: &mut Talk) -> Option<Places> {
+        let screen = self.output.preview.and_then(Screen::of);
+        if target.is_none() && screen.is_none() {
+            let message =
+                "nothing is shown: stdout is no terminal; --preview=blocks shows it there";
+            talk.warn(message.to_owned());
+            return None;
+        }
+        Some(Places { target, screen })
     }
 
     fn load(&self, talk: &mut Talk) -> Result<Loaded, Failure> {

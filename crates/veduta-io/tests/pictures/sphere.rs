@@ -67,34 +67,22 @@ fn axis(name: &str) -> DVec3 {
     }
 }
 
+/// A strip, whatever its columns.
+const STRIP: &[[&str; 3]] = &[
+    ["right", "back", "up"],
+    ["left", "front", "up"],
+    ["up", "right", "back"],
+    ["down", "right", "front"],
+    ["front", "right", "up"],
+    ["back", "left", "up"],
+];
+
 /// Of each layout its columns, and of each cell, row by row, what is in the middle of it, to its right and
 /// above. Strips and eac: as FFmpeg's v360 was seen to write them. sv3d: as the specification of Spherical
 /// Video V2 says; crosses: folded.
 const LAYOUTS: &[(&str, u32, &[[&str; 3]])] = &[
-    (
-        "3x2",
-        3,
-        &[
-            ["right", "back", "up"],
-            ["left", "front", "up"],
-            ["up", "right", "back"],
-            ["down", "right", "front"],
-            ["front", "right", "up"],
-            ["back", "left", "up"],
-        ],
-    ),
-    (
-        "1x6",
-        1,
-        &[
-            ["right", "back", "up"],
-            ["left", "front", "up"],
-            ["up", "right", "back"],
-            ["down", "right", "front"],
-            ["front", "right", "up"],
-            ["back", "left", "up"],
-        ],
-    ),
+    ("3x2", 3, STRIP),
+    ("1x6", 1, STRIP),
     (
         "eac",
         3,

@@ -47,6 +47,11 @@ fn coverage_of_band(map: &VisibilityMap, bands: &Bands, band: usize) -> Vec<Cove
                 Cells::Inside { row, columns } => columns.for_each(|column| push(column, row, 1.0)),
             });
     }
+    summed(rows)
+}
+
+/// Rows ascending by pixel and face, one for each of both.
+pub(super) fn summed(mut rows: Vec<Coverage>) -> Vec<Coverage> {
     // A stable sort: fragments of a face are summed in their order.
     rows.sort_by_key(|row| (row.pixel, row.face));
     rows.dedup_by(|next, first| {

@@ -8,11 +8,13 @@
 //! Input: [`PatchedView`]s, maps with an index of what is seen where, and the patches of a band. Output:
 //! [`PatchedParts`], parts with the patch in which each lies.
 
+use super::coverage::summed;
 use super::place::PixelClip;
 use super::veils::{Ground, VeilBuffers, attenuate_on};
 use super::{Coverage, Diced, Part, Parts, Run};
 use crate::reproject::patches::{CubeView, Patch};
 use rayon::prelude::*;
+use std::cell::RefCell;
 use std::ops::Range;
 use veduta_geometry::{Affine, Cells, DMat3, DVec2, DVec3, GridAreas, signed_area};
 use veduta_map::VisibilityMap;
@@ -250,15 +252,7 @@ impl PatchDicer {
                     });
             }
         }
-        rows.sort_by_key(|row| (row.pixel, row.face));
-        rows.dedup_by(|next, first| {
-            let same = (next.pixel, next.face) == (first.pixel, first.face);
-            if same {
-                first.area += next.area;
-            }
-            same
-        });
-        rows
+        summed(rows)
     }
 }
 
@@ -286,6 +280,7 @@ pub fn attenuate_patched(
         view,
         band,
         patches: boundary_patches,
+        placer: RefCell::default(),
     };
     attenuate_on(&ground, view.map, opacities, buffers, parts);
 }
@@ -295,6 +290,8 @@ struct PatchedGround<'a> {
     view: &'a PatchedView<'a>,
     band: &'a PatchedBand<'a>,
     patches: &'a [u32],
+    /// Buffers, which the clips of a band share.
+    placer: RefCell<PatchPlacer>,
 }
 
 impl Ground for PatchedGround<'_> {
@@ -313,7 +310,7 @@ impl Ground for PatchedGround<'_> {
     ) -> &'b [DVec2] {
         let patch = &self.band.patches[patch as usize];
         let looks = self.view.weights_from_image(patch);
-        let mut placer = PatchPlacer::default();
+        let mut placer = self.placer.borrow_mut();
         let polygon = placer.place(self.view.map, patch, looks, fragment);
         let corner = self.band.corner(pixel);
         clip.clip_placed(polygon.iter().map(|&point| point - corner))

@@ -187,8 +187,7 @@ pub fn render_filtered(
     let lens = Lens::Perspective { fov: FRAC_PI_2 };
     let sources = CubeFace::ALL.map(|face| Projection::new(lens, face.orientation(), side, side));
     let reprojection = Reprojection::new(&sources, projection, &Ewa::default());
-    let whole = [DVec2::ZERO, DVec2::ONE];
-    let views = cube_views(eye, |_| [Some(whole); 6]);
+    let views = whole_faces(eye);
     let needs = reprojection.needs();
     let needed = |index: &usize| needs[*index].window.is_some();
     let needed: Vec<usize> = (0..views.len()).filter(needed).collect();
@@ -211,6 +210,11 @@ pub fn render_filtered(
     (reprojection.picture(&planes), faces.collect())
 }
 
+/// All of each face of the cube around `eye`.
+fn whole_faces(eye: &Camera) -> Vec<CubeView> {
+    cube_views(eye, |_| [Some([DVec2::ZERO, DVec2::ONE]); 6])
+}
+
 /// Makes the faces of the cube around `eye` as one picture, each of the size that `settings` tell: a cross as
 /// seen from inside, with left, front, right and back in its second row, the top above the front and the bottom below.
 /// The other squares stay empty.
@@ -222,8 +226,7 @@ pub fn render_cube(
     settings: &RenderSettings,
     mut begin: impl FnMut(Step),
 ) -> Picture {
-    let whole = [DVec2::ZERO, DVec2::ONE];
-    let views = cube_views(eye, |_| [Some(whole); 6]);
+    let views = whole_faces(eye);
     let count = views.len();
     let (width, height) = (settings.width as usize, settings.height as usize);
     let row_of_cross = 4 * width;

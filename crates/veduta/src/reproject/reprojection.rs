@@ -227,9 +227,7 @@ pub fn reproject(
 ) -> (Picture, Missing) {
     let sources: Vec<Projection> = views.iter().map(|(projection, _)| *projection).collect();
     let reprojection = Reprojection::new(&sources, target, ewa);
-    let opaque = views
-        .iter()
-        .all(|(_, picture)| picture.pixels.iter().all(|pixel| pixel[3] == 1.0));
+    let opaque = views.iter().all(|(_, picture)| picture.is_opaque());
     let mut planes = reprojection.views(opaque);
     for (index, (_, picture)) in views.iter().enumerate() {
         planes.set(index, picture);

@@ -110,8 +110,7 @@ impl Geometry {
 
     /// Makes the pictures of a frame from those of its views.
     pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
-        let is_opaque = |picture: &Picture| picture.pixels.iter().all(|pixel| pixel[3] == 1.0);
-        let opaque = views.iter().all(is_opaque);
+        let opaque = views.iter().all(Picture::is_opaque);
         let is_alone = self.parts.len() == 1;
         let make = |part: &mut Part| {
             let channels = if opaque { 3 } else { 4 };

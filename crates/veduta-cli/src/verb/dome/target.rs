@@ -392,7 +392,7 @@ pub fn both(left: Picture, right: &Picture, how: Stereo) -> Picture {
     }
 }
 
-/// The angle that `--fov` and the like take, for other options: `180deg` or `180deg,2deg`.
+/// `--mask`: the angle across a circle, and within it that over which it ends: `180deg` or `180deg,2deg`.
 pub fn mask(text: &str) -> Result<[f64; 2], String> {
     let (fov, feather) = text.split_once(',').unwrap_or((text, "0"));
     let parsed = values::angle(fov).ok().zip(values::angle(feather).ok());

@@ -2,8 +2,7 @@
 
 use super::{Render, View, tell_step};
 use crate::exit::{Code, Failure};
-use crate::preview::Screen;
-use crate::talk::{Talk, print, print_bytes};
+use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::{Args, ValueEnum};
 use std::fmt;
@@ -14,7 +13,7 @@ use veduta::pipeline::{self, RenderSettings, Sampling, Surroundings};
 use veduta::reproject::{LENS_NAMES, Lens, Orientation, Projection};
 use veduta::scene::{Bounds, Scene};
 use veduta_geometry::{DVec2, DVec3};
-use veduta_io::{Loaded, scaled};
+use veduta_io::Loaded;
 
 /// By which lens the picture is made.
 #[derive(Debug, Args)]
@@ -177,14 +176,10 @@ impl Render {
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
         let development = self.look.development(&scene, self.strict, talk)?;
-        let screen = self.output.preview.and_then(Screen::of);
-        if target.is_none() && screen.is_none() {
-            let message =
-                "nothing is shown: stdout is no terminal; --preview=blocks shows it there";
-            talk.warn(message.to_owned());
+        let Some(places) = self.places(target, talk) else {
             return Ok(());
-        }
-        let (mut picture, told_of_lens) = match lens {
+        };
+        let (picture, told_of_lens) = match lens {
             LensArgument::Lens(lens) => self.by_lens(lens, &scene, &eye, size, talk),
             LensArgument::Cube => {
                 let settings = RenderSettings {
@@ -199,31 +194,21 @@ impl Render {
                 (picture, serde_json::json!({}))
             }
         };
-        talk.begin("developing");
-        let mut preview = screen.map(|screen| {
-            let [width, height] = screen.size_of(size.width, size.height);
-            scaled(&picture, width, height)
-        });
-        let mut ev = 0.0;
-        if let Some(target) = &target {
-            ev = development.develop(&mut picture, !target.linear);
-            talk.begin("writing");
-            target.write(&picture, None)?;
-        }
-        if let (Some(screen), Some(preview)) = (screen, &mut preview) {
-            match &target {
-                Some(target) if !target.linear => development.develop_at(preview, ev, true),
-                _ => ev = development.develop(preview, true),
-            }
-            talk.end();
-            print_bytes(&screen.show(preview))?;
-        }
-        talk.end();
+        let ev = places.develop(
+            picture,
+            size,
+            &development,
+            talk,
+            |target, picture, talk| {
+                talk.begin("writing");
+                target.write(picture, None)
+            },
+        )?;
         talk.detail(format_args!(
             "{} faces, exposure {ev:.2} EV",
             scene.face_count()
         ));
-        if let (true, Some(target)) = (json, &target) {
+        if let (true, Some(target)) = (json, &places.target) {
             let mut told = serde_json::json!({
                 "output": target.name(),
                 "size": [size.width, size.height],

@@ -16,35 +16,26 @@ pub(crate) fn mean<V: Vector, const C: usize>(
     footprints: &Footprints,
     lane: usize,
 ) -> [f32; C] {
-    let mean = unclamped::<V, C>(token, ewa, planes, base, footprints, lane);
-    if ewa.clamp && footprints.round[lane] > 0.0 {
-        return clamped(mean, planes, base, footprints, lane);
-    }
-    mean
-}
-
-#[inline(always)]
-fn unclamped<V: Vector, const C: usize>(
-    token: V::Token,
-    ewa: &Ewa,
-    planes: &Planes,
-    base: [i32; 2],
-    footprints: &Footprints,
-    lane: usize,
-) -> [f32; C] {
     let share = footprints.round[lane];
+    // The Gaussian goes beyond no texel.
     if share <= 0.0 {
         return scan::<V, _, C>(token, &Gaussian, planes, base, footprints, lane);
     }
-    if share < 1.0 {
-        return scan::<V, _, C>(token, &Mixture::new(share), planes, base, footprints, lane);
-    }
-    let round = match ewa.profile {
-        Profile::Sharp => &Round::SHARP,
-        Profile::Mitchell => &Round::MITCHELL,
-        _ => &Round::ROBIDOUX,
+    let mean = if share < 1.0 {
+        scan::<V, _, C>(token, &Mixture::new(share), planes, base, footprints, lane)
+    } else {
+        let round = match ewa.profile {
+            Profile::Sharp => &Round::SHARP,
+            Profile::Mitchell => &Round::MITCHELL,
+            _ => &Round::ROBIDOUX,
+        };
+        scan::<V, _, C>(token, round, planes, base, footprints, lane)
     };
-    scan::<V, _, C>(token, round, planes, base, footprints, lane)
+    if ewa.clamp {
+        clamped(mean, planes, base, footprints, lane)
+    } else {
+        mean
+    }
 }
 
 #[inline(always)]
