@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use veduta_geometry::{Affine, DMat4, DVec2, DVec3};
+use veduta_geometry::{Affine, DMat4, DVec2, DVec3, DVec4};
 
 /// How eye space is projected into the image plane.
 ///
@@ -148,15 +148,31 @@ impl Camera {
         }
     }
 
+    /// `(x w, y w, w, z)` of an eye-space point, where `(x, y)` is its place in the image plane.
+    #[inline]
+    pub fn homogeneous(&self, point: DVec3) -> DVec4 {
+        let scale = self.image_scale();
+        let ahead = self.principal_point();
+        match self.projection {
+            Projection::Perspective { .. } => DVec4::new(
+                point.x * scale.x + ahead.x * point.z,
+                point.y * scale.y + ahead.y * point.z,
+                point.z,
+                point.z,
+            ),
+            Projection::Parallel { .. } => DVec4::new(
+                point.x * scale.x + ahead.x,
+                point.y * scale.y + ahead.y,
+                1.0,
+                point.z,
+            ),
+        }
+    }
+
     /// Image point of an eye-space point, which must lie before the eye.
     #[inline]
     pub fn image_from_eye(&self, point: DVec3) -> DVec2 {
-        let scale = self.image_scale();
-        let flat = match self.projection {
-            Projection::Perspective { .. } => DVec2::new(point.x / point.z, point.y / point.z),
-            Projection::Parallel { .. } => DVec2::new(point.x, point.y),
-        };
-        flat * scale + self.principal_point()
+        image_from_homogeneous(self.homogeneous(point))
     }
 
     /// Origin and direction, in eye space, of the line of sight through an image point.
@@ -202,6 +218,12 @@ impl Camera {
         };
         (plane.a.is_finite() && plane.b.is_finite() && plane.c.is_finite()).then_some(plane)
     }
+}
+
+/// The point of the image plane that [`Camera::homogeneous`] tells.
+#[inline]
+pub fn image_from_homogeneous(point: DVec4) -> DVec2 {
+    DVec2::new(point.x / point.z, point.y / point.z)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use xxhash_rust::xxh3::Xxh3;
 pub struct Origin {
     /// All files that its scene was read from.
     pub sources: Vec<Source>,
-    /// What casts; `None` where that is not known, as in files of version 1.0.
+    /// What casts; `None` where that is not known.
     pub casters: Option<Casters>,
 }
 

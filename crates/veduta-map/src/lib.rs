@@ -20,7 +20,7 @@ pub mod scene;
 mod spans;
 mod stored;
 
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, Projection, image_from_homogeneous};
 pub use casters::{Casters, Choice, Origin, Reading, Source};
 pub use faces::Faces;
 pub use fragments::{Fragment, Fragments, Seen, Side};

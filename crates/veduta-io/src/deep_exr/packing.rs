@@ -72,12 +72,17 @@ pub fn pack(compression: DeepCompression, bytes: &[u8]) -> Cow<'_, [u8]> {
 
 /// Bytes at even places, bytes at odd places; then each less the one before, plus 128.
 fn differences(bytes: &[u8]) -> Vec<u8> {
+    let (pairs, last) = bytes.as_chunks::<2>();
     let mut sorted: Vec<u8> = Vec::with_capacity(bytes.len());
-    sorted.extend(bytes.iter().step_by(2));
-    sorted.extend(bytes.iter().skip(1).step_by(2));
+    sorted.extend(pairs.iter().map(|pair| pair[0]));
+    sorted.extend(last);
+    sorted.extend(pairs.iter().map(|pair| pair[1]));
     let mut differences = sorted.clone();
-    for (difference, pair) in differences.iter_mut().skip(1).zip(sorted.windows(2)) {
-        *difference = pair[1].wrapping_sub(pair[0]).wrapping_add(128);
+    let [_, later @ ..] = &mut differences[..] else {
+        return differences;
+    };
+    for ((difference, &byte), &before) in later.iter_mut().zip(&sorted[1..]).zip(&sorted) {
+        *difference = byte.wrapping_sub(before).wrapping_add(128);
     }
     differences
 }

@@ -5,7 +5,7 @@
 
 use super::container::{ArchiveReader, ArchiveWriter};
 use super::manifest::{MANIFEST, Manifest, Segment};
-use super::tests::{casters, seen, seen_spans, written_of, written_spans};
+use super::tests::{casters, projected, seen, seen_spans, written_of, written_spans};
 use super::*;
 use crate::scene::ImageId;
 use crate::{Lines, SeenScene};
@@ -56,13 +56,13 @@ fn effort() -> usize {
 
 /// The members of a file, which can be changed and put together again with right checksums.
 #[derive(Clone)]
-struct Parts {
+pub(super) struct Parts {
     manifest: Manifest,
     tables: Vec<(String, Vec<u8>)>,
 }
 
 impl Parts {
-    fn of(bytes: &[u8]) -> Self {
+    pub(super) fn of(bytes: &[u8]) -> Self {
         let mut archive = ArchiveReader::new(Cursor::new(bytes)).expect("sound");
         let mut parts = Vec::new();
         for member in archive.members().to_vec() {
@@ -104,6 +104,12 @@ impl Parts {
         writer.write_all(&json).expect("memory takes all");
         writer.end().expect("memory takes all");
         writer.finish().expect("memory takes all").into_inner()
+    }
+
+    /// The batches of a member.
+    pub(super) fn rows(&self, member: &str) -> Vec<RecordBatch> {
+        let table = self.tables.iter().position(|(name, _)| name == member);
+        self.batches(table.expect("a table of the file"))
     }
 
     fn batches(&self, table: usize) -> Vec<RecordBatch> {
@@ -180,6 +186,7 @@ fn sound_files() -> Vec<(&'static str, Vec<u8>)> {
             "a map with casters",
             written_of(&seen(12), Some(casters(3))),
         ),
+        ("a map of vertices", written_of(&projected(8), None)),
         ("spans", written_spans(&seen_spans())),
     ]
 }
@@ -383,8 +390,15 @@ fn forge_value(array: &ArrayRef, row: usize, random: &mut Random) -> Option<Arra
             Arc::new(UInt32Array::from(with(values, row, value)))
         }
         DataType::Float64 => {
-            let values = array.as_primitive::<Float64Type>().values();
-            let old = values[row];
+            let array = array.as_primitive::<Float64Type>();
+            let old = array.value(row);
+            if random.below(8) == 0 {
+                let gap = array
+                    .iter()
+                    .enumerate()
+                    .map(|(k, value)| value.filter(|_| k != row));
+                return Some(Arc::new(gap.collect::<Float64Array>()));
+            }
             let value = random.of(&[
                 f64::NAN,
                 f64::INFINITY,
@@ -399,7 +413,8 @@ fn forge_value(array: &ArrayRef, row: usize, random: &mut Random) -> Option<Arra
                 1.0 - old,
                 old.next_up(),
             ]);
-            Arc::new(Float64Array::from(with(values, row, value)))
+            let values: Vec<Option<f64>> = array.iter().collect();
+            Arc::new(Float64Array::from(with(&values, row, Some(value))))
         }
         DataType::Float32 => {
             let array = array.as_primitive::<Float32Type>();

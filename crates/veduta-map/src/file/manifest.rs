@@ -16,7 +16,7 @@ pub const FORMAT: &str = "veduta visibility map";
 pub const SPANS_FORMAT: &str = "veduta multiscan spans";
 
 /// Major version: readers refuse others. Minor version: readers skip what they do not know.
-pub const VERSION: [u32; 2] = [1, 1];
+pub const VERSION: [u32; 2] = [2, 0];
 
 /// The manifest. Fields that a reader does not know are skipped.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,9 +28,7 @@ pub struct Manifest {
     pub generator: String,
     /// Pixels of the picture it was made for; a map has no resolution.
     pub size: [u32; 2],
-    /// Whether something was cut or left out, so that a face may be unseen where nothing hides it; since
-    /// version 1.1.
-    #[serde(default)]
+    /// Whether something was cut or left out, so that a face may be unseen where nothing hides it.
     pub has_holes: bool,
     pub camera: Camera,
     pub world: World,
@@ -38,15 +36,13 @@ pub struct Manifest {
     pub lights: Vec<Light>,
     pub materials: Vec<Material>,
     pub sources: Vec<Source>,
-    /// Sub-scanlines of a row of pixels, in a file that holds spans in place of regions; since version
-    /// 1.1.
+    /// Sub-scanlines of a row of pixels, in a file that holds spans in place of regions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sub_scanlines: Option<u32>,
-    /// What casts shadows; since version 1.1.
+    /// What casts shadows, where that is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub casters: Option<CastersTold>,
-    /// Pictures of other programs; since version 1.1.
-    #[serde(default)]
+    /// Pictures of other programs.
     pub guests: Vec<GuestEntry>,
     /// Boxes around what the tiles' faces show: left, top, right, bottom, in the image plane. Tile `i`
     /// is batch `i` of the members that are cut into tiles.

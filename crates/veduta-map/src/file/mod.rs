@@ -7,7 +7,8 @@
 //! - `spans` is what multiscan found, in a file of another kind: in place of regions.
 //! - `guests` are pictures of other programs.
 //! - `tables` are the columns; `tiles` says which rows stand together, so that a window of the picture
-//!   reads little; `container` is the archive, `manifest` what else there is to know.
+//!   reads little; `projected` is what is left out since it follows from vertices; `container` is the
+//!   archive, `manifest` what else there is to know.
 //! - Every byte is under a checksum, or is compared with its only legal value, before it is decoded:
 //!   damage is an error that says where, never another picture.
 //! - Equal maps make equal bytes.
@@ -20,6 +21,7 @@ mod container;
 mod guests;
 mod manifest;
 mod message;
+mod projected;
 mod read;
 mod spans;
 mod tables;

@@ -6,6 +6,7 @@ use super::container::{ArchiveReader, Member};
 use super::guests;
 use super::manifest::{MANIFEST, Manifest, SPANS_FORMAT, Segment, Table};
 use super::message;
+use super::projected::Projected;
 use super::spans;
 use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
 use crate::scene::{Mesh, MeshId, Object, Scene};
@@ -17,7 +18,6 @@ use arrow_array::RecordBatch;
 use arrow_ipc::MetadataVersion;
 use arrow_ipc::reader::FileDecoder;
 use arrow_schema::SchemaRef;
-use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 use std::sync::Arc;
 use veduta_geometry::{Affine, DVec2};
@@ -263,11 +263,13 @@ impl<R: Read + Seek> MapReader<R> {
         tiles: impl Iterator<Item = usize>,
         heights: [f64; 2],
     ) -> Result<SeenScene, FileError> {
+        let scene = self.scene_without_meshes()?;
         let mut rows = SeenRows::default();
         let mut of_tiles = Vec::new();
         for &table in self.of_tiles() {
             of_tiles.push(TableReader::new(self, table.member())?);
         }
+        let camera = self.manifest.camera;
         for tile in tiles {
             let mut batches = Vec::with_capacity(of_tiles.len());
             for table in &of_tiles {
@@ -278,15 +280,39 @@ impl<R: Read + Seek> MapReader<R> {
                 member: table.member(),
                 index: tile,
             };
-            let points = of(TableName::Points).points()?;
-            rows.faces.extend(of(TableName::Faces).faces(&points)?);
-            rows.vertices.extend(of(TableName::Vertices).vertices()?);
+            let vertices = of(TableName::Vertices).vertices()?;
+            if let Some(astray) = vertices
+                .iter()
+                .find(|row| row.object as usize >= scene.objects.len())
+            {
+                let what = format!("object {} is not there", astray.object);
+                return Err(of(TableName::Vertices).unsound(what));
+            }
+            let places = vertices
+                .iter()
+                .map(|row| ((row.object, row.vertex), row.at.position));
+            let projected = Projected::new(&camera, places, |object| {
+                &scene.objects[object as usize].world_from_object
+            });
+            let points = of(TableName::Points).points(&projected)?;
+            rows.faces
+                .extend(of(TableName::Faces).faces(&points, &projected)?);
+            rows.vertices.extend(vertices);
             if of_tiles.len() == TableName::OF_TILES.len() {
                 rows.opaque
                     .extend(of(TableName::Opaque).fragments(&points)?);
                 rows.veils.extend(of(TableName::Veils).fragments(&points)?);
             }
         }
+        let guests = self.read_guests(heights)?;
+        Ok(SeenScene {
+            guests,
+            ..rows.into_seen(scene, &self.manifest)?
+        })
+    }
+
+    /// Reads all of the scene but its meshes.
+    fn scene_without_meshes(&mut self) -> Result<Scene, FileError> {
         let mut scene = Scene {
             materials: self.manifest.materials.clone(),
             lights: self.manifest.lights.clone(),
@@ -310,11 +336,7 @@ impl<R: Read + Seek> MapReader<R> {
             Ok(())
         })?;
         check_scene(&scene)?;
-        let guests = self.read_guests(heights)?;
-        Ok(SeenScene {
-            guests,
-            ..rows.into_seen(scene, &self.manifest)?
-        })
+        Ok(scene)
     }
 
     /// Reads the bands of guests between two heights of the image plane. Guests of which that is nothing
@@ -558,7 +580,7 @@ impl SeenRows {
             sound.map_err(|error| FileError::unsound(faces, error.to_string()))?;
         }
         let numbers: Vec<u32> = self.faces.iter().map(|row| row.face).collect();
-        let new_id = |face: u32| numbers.binary_search(&face).ok().map(FaceId::from_index);
+        let new_id = |face: u32| place_of(face, &numbers, |&face| face).map(FaceId::from_index);
         Ok(SeenScene {
             map: VisibilityMap {
                 camera: manifest.camera,
@@ -577,19 +599,26 @@ impl SeenRows {
     fn face_table(&self, scene: &mut Scene) -> Result<Faces, FileError> {
         let unsound = |what: String| FileError::unsound(TableName::Faces.member(), what);
         let mut table = Faces::with_capacity(self.faces.len());
-        let mut planes: BTreeMap<u32, Affine> = BTreeMap::new();
-        for row in &self.faces {
-            if *planes.entry(row.plane).or_insert(row.nearness) != row.nearness {
-                return Err(unsound(format!(
-                    "plane {} is told twice, differently",
-                    row.plane
-                )));
-            }
-        }
-        let planes: BTreeMap<u32, PlaneId> = planes
-            .into_iter()
-            .map(|(plane, nearness)| (plane, table.push_plane(nearness)))
+        let mut planes: Vec<(u32, Affine)> = self
+            .faces
+            .iter()
+            .map(|row| (row.plane, row.nearness))
             .collect();
+        planes.sort_by_key(|&(plane, _)| plane);
+        planes.dedup();
+        if let Some(pair) = planes.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            let what = format!("plane {} is told twice, differently", pair[0].0);
+            return Err(unsound(what));
+        }
+        let ids: Vec<PlaneId> = planes
+            .iter()
+            .map(|&(_, nearness)| table.push_plane(nearness))
+            .collect();
+        // Vertices ascend, and those of the faces at hand were read with them.
+        let mut of_objects: Vec<&[VertexRow]> = vec![&[]; scene.objects.len()];
+        for rows in self.vertices.chunk_by(|a, b| a.object == b.object) {
+            of_objects[rows[0].object as usize] = rows;
+        }
         for row in &self.faces {
             let misfit = |what: &str| unsound(format!("face {}: {what}", row.face));
             if row.material as usize >= scene.materials.len() {
@@ -597,13 +626,10 @@ impl SeenRows {
             }
             let mesh = scene.meshes.get_mut(row.object as usize);
             let mesh = mesh.ok_or_else(|| misfit("its object is not there"))?;
-            // Vertices ascend, and those of the faces at hand were read with them.
-            let of_object = self.vertices.partition_point(|v| v.object < row.object);
-            let of_object = &self.vertices[of_object..];
+            let vertices = of_objects[row.object as usize];
             let corner = |&vertex: &u32| {
-                let row_of = |v: &VertexRow| (v.object, v.vertex);
-                let found = of_object.binary_search_by_key(&(row.object, vertex), row_of);
-                found.ok().map(|index| index as u32)
+                let place = place_of(vertex, vertices, |row| row.vertex);
+                place.map(|index| index as u32)
             };
             let corners: Option<Vec<u32>> = row.corners.iter().map(corner).collect();
             let corners = corners.filter(|corners| corners.len() >= 3);
@@ -623,13 +649,24 @@ impl SeenRows {
                 return Err(misfit("its outline has no area or is not wound clockwise"));
             }
             let object = ObjectId(row.object);
-            let id = table.push(&row.outline, planes[&row.plane], object, source);
+            let plane = place_of(row.plane, &planes, |&(plane, _)| plane);
+            let plane = ids[plane.expect("planes of all faces")];
+            let id = table.push(&row.outline, plane, object, source);
             let id = id.ok_or_else(|| misfit("its outline has no area"))?;
             if !row.opaque {
                 table.set_veil(id);
             }
         }
         Ok(table)
+    }
+}
+
+/// Where in rows, whose numbers ascend, one with this number stands. In what is read as a whole that is its number.
+fn place_of<T>(number: u32, rows: &[T], number_of: impl Fn(&T) -> u32) -> Option<usize> {
+    let there = number as usize;
+    match rows.get(there).is_some_and(|row| number_of(row) == number) {
+        true => Some(there),
+        false => rows.binary_search_by_key(&number, number_of).ok(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! The tables of a file: their columns, and rows <-> batches.
 
 use super::FileError;
+use super::projected::{Projected, same_nearness, same_points};
 use super::tiles::Tile;
 use crate::scene::{Image, Mesh, Object, Scene};
 use crate::{FaceId, Fragment, Fragments, ObjectId, Side, VisibilityMap};
@@ -85,9 +86,9 @@ impl TableName {
                 number("material"),
                 Field::new("opaque", DataType::Boolean, false),
                 number("plane"),
-                real("a"),
-                real("b"),
-                real("c"),
+                Field::new("a", DataType::Float64, true),
+                Field::new("b", DataType::Float64, true),
+                Field::new("c", DataType::Float64, true),
                 numbers("outline"),
                 numbers("corners"),
             ],
@@ -172,48 +173,166 @@ impl Lists {
     }
 }
 
-/// A tile's tables, which name each other's rows.
-pub struct TileBatches {
-    batches: [RecordBatch; 5],
+/// What the tables of a tile are made of, which name each other's rows.
+pub struct TileRows<'a> {
+    map: &'a VisibilityMap,
+    scene: &'a Scene,
+    tile: &'a Tile,
+    /// The faces, ascending.
+    faces: Vec<FaceId>,
+    /// Object and number of the vertices, ascending.
+    vertices: Vec<(ObjectId, u32)>,
 }
 
-impl TileBatches {
-    pub fn new(map: &VisibilityMap, scene: &Scene, tile: &Tile) -> Self {
-        let named = tile.faces_named(map);
-        let mut points = PointRows::default();
-        let faces = face_rows(map, scene, &named, &mut points);
-        let opaque = fragment_rows(Opaque, &map.opaque, &tile.opaque, &mut points);
-        let veils = fragment_rows(Veils, &map.veils, &tile.veils, &mut points);
-        let vertices = vertex_rows(map, scene, &named);
+impl<'a> TileRows<'a> {
+    pub fn new(map: &'a VisibilityMap, scene: &'a Scene, tile: &'a Tile) -> Self {
+        let faces = tile.faces_named(map);
+        let mut vertices: Vec<(ObjectId, u32)> = Vec::new();
+        for &face in &faces {
+            let object = map.faces.object(face);
+            let corners = scene.mesh_of(object).corners_of(map.faces.source(face));
+            vertices.extend(corners.map(|corner| (object, corner)));
+        }
+        vertices.sort_unstable();
+        vertices.dedup();
         Self {
-            batches: [points.finish(), vertices, faces, opaque, veils],
+            map,
+            scene,
+            tile,
+            faces,
+            vertices,
         }
     }
 
-    pub fn of(&self, table: TableName) -> &RecordBatch {
-        &self.batches[table as usize]
+    /// The batch of one of the tables.
+    pub fn batch(&self, table: TableName) -> RecordBatch {
+        if table == Vertices {
+            return self.vertex_rows();
+        }
+        let projected = self.projected();
+        let mut points = PointRows::after(projected.image());
+        // Points are counted in this order.
+        let faces = self.face_rows(&projected, &mut points);
+        if table == Faces {
+            return faces;
+        }
+        let opaque = fragment_rows(Opaque, &self.map.opaque, &self.tile.opaque, &mut points);
+        if table == Opaque {
+            return opaque;
+        }
+        let veils = fragment_rows(Veils, &self.map.veils, &self.tile.veils, &mut points);
+        match table {
+            Veils => veils,
+            _ => points.finish(),
+        }
+    }
+
+    fn projected(&self) -> Projected<'a> {
+        let vertices = self.vertices.iter().map(|&(object, vertex)| {
+            let mesh = self.scene.mesh_of(object);
+            ((object.0, vertex), mesh.positions[vertex as usize])
+        });
+        Projected::new(&self.map.camera, vertices, |object| {
+            &self.scene.object(ObjectId(object)).world_from_object
+        })
+    }
+
+    fn face_rows(&self, projected: &Projected, points: &mut PointRows) -> RecordBatch {
+        let (table, faces) = (&self.map.faces, &self.faces);
+        let (mut outlines, mut corners) = (Lists::new(), Lists::new());
+        let mut materials = Vec::with_capacity(faces.len());
+        let mut planes = Vec::with_capacity(faces.len());
+        for &face in faces {
+            let mesh = self.scene.mesh_of(table.object(face));
+            let source = table.source(face);
+            let rows = projected.rows_of(table.object(face).0, mesh.corners_of(source));
+            let rows = rows.expect("corners of all faces");
+            let outline = table.outline(face);
+            if same_points(&projected.outline(&rows), outline) {
+                outlines.push(std::iter::empty());
+            } else {
+                outlines.push(outline.iter().map(|&point| points.row_of(point)));
+            }
+            let nearness = *table.face_nearness(face);
+            let follows = projected.nearness(&rows);
+            let follows = follows.is_some_and(|plane| same_nearness(&plane, &nearness));
+            planes.push((!follows).then_some(nearness));
+            corners.push(mesh.corners_of(source));
+            materials.push(mesh.material_of(source).0);
+        }
+        let plane = |of: fn(&Affine) -> f64| -> ArrayRef {
+            let told = planes.iter().map(|plane| plane.as_ref().map(of));
+            Arc::new(Float64Array::from_iter(told))
+        };
+        let opaque: BooleanArray = faces
+            .iter()
+            .map(|&face| Some(!table.is_veil(face)))
+            .collect();
+        Faces.batch(vec![
+            numbers(faces.iter().map(|face| face.0)),
+            numbers(faces.iter().map(|&face| table.object(face).0)),
+            numbers(materials.into_iter()),
+            Arc::new(opaque),
+            numbers(faces.iter().map(|&face| table.plane(face).0)),
+            plane(|plane| plane.a),
+            plane(|plane| plane.b),
+            plane(|plane| plane.c),
+            outlines.finish(),
+            corners.finish(),
+        ])
+    }
+
+    fn vertex_rows(&self) -> RecordBatch {
+        let rows = &self.vertices;
+        let meshes: Vec<(&Mesh, usize)> = rows
+            .iter()
+            .map(|&(object, vertex)| (self.scene.mesh_of(object), vertex as usize))
+            .collect();
+        let mut columns = vec![
+            numbers(rows.iter().map(|row| row.0.0)),
+            numbers(rows.iter().map(|row| row.1)),
+        ];
+        columns.extend(vertex_columns(&meshes));
+        Vertices.batch(columns)
     }
 }
 
-/// Points of the image plane, each once: neighbours name the same.
-#[derive(Default)]
+/// Points of the image plane, each once: neighbours name the same. The first are those of vertices, which stand
+/// in no table.
 struct PointRows {
     points: Vec<DVec2>,
+    of_vertices: usize,
     rows: HashMap<[u64; 2], u32>,
 }
 
 impl PointRows {
+    fn after(vertices: &[DVec2]) -> Self {
+        let mut points = Self {
+            points: vertices.to_vec(),
+            of_vertices: vertices.len(),
+            rows: HashMap::with_capacity(2 * vertices.len()),
+        };
+        for (&point, row) in vertices.iter().zip(0..) {
+            points.rows.entry(Self::key(point)).or_insert(row);
+        }
+        points
+    }
+
+    fn key(point: DVec2) -> [u64; 2] {
+        [point.x.to_bits(), point.y.to_bits()]
+    }
+
     fn row_of(&mut self, point: DVec2) -> u32 {
-        let key = [point.x.to_bits(), point.y.to_bits()];
-        *self.rows.entry(key).or_insert_with(|| {
+        *self.rows.entry(Self::key(point)).or_insert_with(|| {
             self.points.push(point);
             self.points.len() as u32 - 1
         })
     }
 
     fn finish(self) -> RecordBatch {
+        let points = &self.points[self.of_vertices..];
         let column = |of: fn(&DVec2) -> f64| -> ArrayRef {
-            Arc::new(Float64Array::from_iter_values(self.points.iter().map(of)))
+            Arc::new(Float64Array::from_iter_values(points.iter().map(of)))
         };
         Points.batch(vec![column(|point| point.x), column(|point| point.y)])
     }
@@ -222,49 +341,6 @@ impl PointRows {
 /// A column of numbers.
 pub fn numbers(values: impl Iterator<Item = u32>) -> ArrayRef {
     Arc::new(UInt32Array::from_iter_values(values))
-}
-
-fn face_rows(
-    map: &VisibilityMap,
-    scene: &Scene,
-    faces: &[FaceId],
-    points: &mut PointRows,
-) -> RecordBatch {
-    let table = &map.faces;
-    let (mut outlines, mut corners) = (Lists::new(), Lists::new());
-    let mut materials = Vec::with_capacity(faces.len());
-    for &face in faces {
-        let mesh = scene.mesh_of(table.object(face));
-        let source = table.source(face);
-        outlines.push(
-            table
-                .outline(face)
-                .iter()
-                .map(|&point| points.row_of(point)),
-        );
-        corners.push(mesh.corners_of(source));
-        materials.push(mesh.material_of(source).0);
-    }
-    let plane = |of: fn(&Affine) -> f64| -> ArrayRef {
-        let planes = faces.iter().map(|&face| of(table.face_nearness(face)));
-        Arc::new(Float64Array::from_iter_values(planes))
-    };
-    let opaque: BooleanArray = faces
-        .iter()
-        .map(|&face| Some(!table.is_veil(face)))
-        .collect();
-    Faces.batch(vec![
-        numbers(faces.iter().map(|face| face.0)),
-        numbers(faces.iter().map(|&face| table.object(face).0)),
-        numbers(materials.into_iter()),
-        Arc::new(opaque),
-        numbers(faces.iter().map(|&face| table.plane(face).0)),
-        plane(|plane| plane.a),
-        plane(|plane| plane.b),
-        plane(|plane| plane.c),
-        outlines.finish(),
-        corners.finish(),
-    ])
 }
 
 fn fragment_rows(
@@ -294,27 +370,6 @@ fn fragment_rows(
         side_faces.finish(),
         side_kinds.finish(),
     ])
-}
-
-fn vertex_rows(map: &VisibilityMap, scene: &Scene, faces: &[FaceId]) -> RecordBatch {
-    let mut rows: Vec<(ObjectId, u32)> = Vec::new();
-    for &face in faces {
-        let object = map.faces.object(face);
-        let corners = scene.mesh_of(object).corners_of(map.faces.source(face));
-        rows.extend(corners.map(|corner| (object, corner)));
-    }
-    rows.sort_unstable();
-    rows.dedup();
-    let meshes: Vec<(&Mesh, usize)> = rows
-        .iter()
-        .map(|&(object, vertex)| (scene.mesh_of(object), vertex as usize))
-        .collect();
-    let mut columns = vec![
-        numbers(rows.iter().map(|row| row.0.0)),
-        numbers(rows.iter().map(|row| row.1)),
-    ];
-    columns.extend(vertex_columns(&meshes));
-    Vertices.batch(columns)
 }
 
 /// The columns of [`vertex_fields`], of rows of meshes.
@@ -440,37 +495,77 @@ impl Rows<'_> {
         })
     }
 
-    /// The points of a tile.
-    pub fn points(&self) -> Result<Vec<DVec2>, FileError> {
+    /// The points of a tile after those of its vertices.
+    pub fn points(&self, projected: &Projected) -> Result<Vec<DVec2>, FileError> {
         let (x, y) = (self.reals("x")?, self.reals("y")?);
-        Ok(x.iter().zip(y).map(|(&x, &y)| DVec2::new(x, y)).collect())
+        let told = x.iter().zip(y).map(|(&x, &y)| DVec2::new(x, y));
+        Ok(projected.image().iter().copied().chain(told).collect())
     }
 
-    /// The faces of a tile; outlines are of `points`.
-    pub fn faces(&self, points: &[DVec2]) -> Result<Vec<FaceRow>, FileError> {
+    /// The faces of a tile; outlines are of `points`, or, like planes, follow from vertices.
+    pub fn faces(
+        &self,
+        points: &[DVec2],
+        projected: &Projected,
+    ) -> Result<Vec<FaceRow>, FileError> {
         let (face, object) = (self.numbers("face")?, self.numbers("object")?);
         let (material, plane) = (self.numbers("material")?, self.numbers("plane")?);
         let opaque = self.booleans("opaque")?;
-        let (a, b, c) = (self.reals("a")?, self.reals("b")?, self.reals("c")?);
+        let nearness = [self.gappy("a")?, self.gappy("b")?, self.gappy("c")?];
         let (outlines, corners) = (self.lists("outline")?, self.lists("corners")?);
         (0..face.len())
             .map(|row| {
+                let misfit = |what: &str| self.unsound(format_args!("face {}: {what}", face[row]));
+                let corners = corners.of(row);
+                let rows = projected.rows_of(object[row], corners.iter().copied());
+                let rows = rows.filter(|rows| rows.len() >= 3);
+                let rows = rows.ok_or_else(|| misfit("its corners are not there"))?;
+                let nearness = match nearness.map(|column| column.is_valid(row)) {
+                    [true, true, true] => {
+                        let [a, b, c] = nearness.map(|column| column.value(row));
+                        Affine::new(a, b, c)
+                    }
+                    [false, false, false] => projected
+                        .nearness(&rows)
+                        .ok_or_else(|| misfit("its corners tell no plane"))?,
+                    _ => return Err(misfit("a part of its plane is missing")),
+                };
+                let outline = match outlines.of(row) {
+                    [] => projected.outline(&rows),
+                    told => self.outline(told, points)?,
+                };
+                if !outline.iter().all(|point| point.is_finite()) {
+                    return Err(misfit("a corner of it has no place in the picture"));
+                }
                 Ok(FaceRow {
                     face: face[row],
                     object: object[row],
                     material: material[row],
                     opaque: opaque.value(row),
                     plane: plane[row],
-                    nearness: Affine::new(a[row], b[row], c[row]),
-                    outline: self.outline(outlines.of(row), points)?,
-                    corners: corners.of(row).to_vec(),
+                    nearness,
+                    outline,
+                    corners: corners.to_vec(),
                 })
             })
             .collect()
     }
 
+    /// Real numbers, some of which may be missing.
+    fn gappy(&self, name: &str) -> Result<&Float64Array, FileError> {
+        let column: &Float64Array =
+            self.column(name, |column| column.as_primitive_opt::<Float64Type>())?;
+        if column.iter().flatten().any(|value| !value.is_finite()) {
+            return Err(self.unsound(format_args!("a number in `{name}` is not finite")));
+        }
+        Ok(column)
+    }
+
     fn outline(&self, rows: &[u32], points: &[DVec2]) -> Result<Vec<DVec2>, FileError> {
-        let point = |&row: &u32| points.get(row as usize).copied();
+        let point = |&row: &u32| {
+            let point = points.get(row as usize).copied();
+            point.filter(|point| point.is_finite())
+        };
         let outline: Option<Vec<DVec2>> = rows.iter().map(point).collect();
         outline.ok_or_else(|| self.unsound("an outline names a point that is not there"))
     }
@@ -620,7 +715,7 @@ pub struct VertexRow {
 /// Where a vertex is, and what it looks like.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vertex {
-    position: DVec3,
+    pub position: DVec3,
     /// As bits, so that equal rows are equal whatever they hold.
     attributes: [Option<u32>; ATTRIBUTES.len()],
 }

@@ -1,3 +1,4 @@
+use super::forged::Parts;
 use super::*;
 use crate::VisibilityMap;
 use crate::scene::{
@@ -9,7 +10,9 @@ use crate::{
     MaterialId, ObjectId, Origin, Projection, Reading, SeenScene, SeenSpans, Side, Source, Span,
     SpanBand, Spans,
 };
-use std::io::{Cursor, Write};
+use arrow_array::Array;
+use arrow_array::cast::AsArray;
+use std::io::Cursor;
 use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
 
 fn camera() -> Camera {
@@ -324,6 +327,70 @@ fn what_was_written_is_read_bit_for_bit() {
     }
 }
 
+/// The strip of [`mesh`] as the camera sees it, of which the last face has a plane and an outline of its own.
+pub(super) fn projected(faces: u32) -> SeenScene {
+    let scene = scene(faces);
+    let (camera, object) = (camera(), ObjectId(0));
+    let eye_from_object = camera.eye_from_world * scene.object(object).world_from_object;
+    let mesh = scene.mesh_of(object);
+    let eye = |vertex: u32| eye_from_object.transform_point3(mesh.positions[vertex as usize]);
+    let (mut table, mut opaque) = (Faces::new(), Fragments::new());
+    for source in 0..faces {
+        let corners: Vec<DVec3> = mesh.corners_of(source).map(eye).collect();
+        let [p, q, r] = [0, 1, 2].map(|corner| corners[corner]);
+        let nearness = camera.nearness_of_plane(p, (q - p).cross(r - p));
+        let mut nearness = nearness.expect("not edge-on");
+        let mut outline: Vec<DVec2> = corners.iter().map(|&p| camera.image_from_eye(p)).collect();
+        if source + 1 == faces {
+            nearness.c = nearness.c.next_up();
+            outline[0].x = outline[0].x.next_up();
+        }
+        let plane = table.push_plane(nearness);
+        let face = table.push(&outline, plane, object, source);
+        opaque.push_whole(face.expect("a face with area"));
+    }
+    let map = VisibilityMap {
+        camera,
+        faces: table,
+        opaque,
+        veils: Fragments::new(),
+    };
+    SeenScene::of(&scene, &map, [1920, 1080])
+}
+
+#[test]
+fn what_follows_from_vertices_is_left_out_and_comes_back_bit_for_bit() {
+    let seen = projected(12);
+    let bytes = written(&seen);
+    let found = read(&bytes).expect("sound");
+    assert!(found == seen);
+    for face in seen.map.faces.ids() {
+        let [found, expected] = [&found, &seen].map(|seen| {
+            let corners = seen.map.faces.outline(face).iter();
+            let nearness = seen.map.faces.face_nearness(face);
+            let numbers = corners.flat_map(|corner| corner.to_array());
+            let numbers = numbers.chain([nearness.a, nearness.b, nearness.c]);
+            numbers.map(f64::to_bits).collect::<Vec<u64>>()
+        });
+        assert_eq!(found, expected);
+    }
+    // Of 12 faces the last one is told.
+    let faces = Parts::of(&bytes).rows("faces.arrow");
+    let told = |column: &str| {
+        faces[0]
+            .column_by_name(column)
+            .expect("is there")
+            .null_count()
+    };
+    assert_eq!(["a", "b", "c"].map(told), [11; 3]);
+    let outlines = faces[0].column_by_name("outline").expect("is there");
+    let outlines = outlines.as_list::<i32>().iter().flatten();
+    let told: usize = outlines.map(|outline| outline.len()).sum();
+    assert_eq!(told, 3, "a triangle");
+    let points = Parts::of(&bytes).rows("points.arrow");
+    assert_eq!(points[0].num_rows(), 1, "the corner that was moved");
+}
+
 #[test]
 fn casters_are_read_bit_for_bit_by_those_who_ask() {
     // Meshes within a batch, and one over several.
@@ -383,13 +450,6 @@ fn spans_are_read_bit_for_bit_and_are_no_map() {
     let bytes = written_spans(&empty);
     let mut reader = MapReader::new(Cursor::new(&bytes)).expect("sound");
     assert!(reader.check_spans().expect("sound") == empty);
-}
-
-#[test]
-fn a_file_of_version_1_0_is_read() {
-    let bytes = written(&seen(12));
-    let old = rewritten(&bytes, |manifest| manifest.version = [1, 0]);
-    assert!(read(&old).expect("sound") == seen(12));
 }
 
 #[test]
@@ -556,30 +616,6 @@ fn a_window_reads_the_bands_of_guests_that_lie_in_it() {
 }
 
 #[test]
-fn a_manifest_without_guests_holes_and_ways_to_be_shown_is_read() {
-    // What such a file lacks in its manifest.
-    let manifest = written(&SeenScene {
-        guests: Vec::new(),
-        has_holes: false,
-        ..seen(6)
-    });
-    let reader = MapReader::new(Cursor::new(&manifest)).expect("sound");
-    let mut told = serde_json::to_value(reader.manifest()).expect("JSON");
-    let fields = told.as_object_mut().expect("an object");
-    fields.remove("guests").expect("is there");
-    fields.remove("has_holes").expect("is there");
-    fields["version"] = serde_json::json!([1, 0]);
-    fields["layers"][0]
-        .as_object_mut()
-        .expect("a layer")
-        .remove("shown");
-    let text = serde_json::to_vec(&told).expect("JSON");
-    let found = manifest::Manifest::parse(&text).expect("read");
-    assert_eq!((found.guests.len(), found.has_holes), (0, false));
-    assert_eq!(found.layers[0].shown, Shown::Seen);
-}
-
-#[test]
 fn flipped_bits_of_a_large_file_are_errors() {
     let sound = written_of(&seen(6000), Some(casters(1000)));
     let flips: u64 = std::env::var("VEDUTA_DAMAGE").map_or(500, |n| n.parse().expect("a number"));
@@ -595,35 +631,12 @@ fn flipped_bits_of_a_large_file_are_errors() {
     }
 }
 
-/// The file with another manifest, all checksums right.
-fn rewritten(bytes: &[u8], change: impl FnOnce(&mut manifest::Manifest)) -> Vec<u8> {
-    let mut archive = container::ArchiveReader::new(Cursor::new(bytes)).expect("sound");
-    let mut writer = container::ArchiveWriter::new(Cursor::new(Vec::new()));
-    let mut change = Some(change);
-    for member in archive.members().to_vec() {
-        let mut contents = archive
-            .bytes("a member", member.start(), member.length)
-            .expect("sound");
-        if member.name == manifest::MANIFEST
-            && let Some(change) = change.take()
-        {
-            let mut manifest = manifest::Manifest::parse(&contents).expect("sound");
-            change(&mut manifest);
-            contents = serde_json::to_vec(&manifest).expect("JSON");
-        }
-        writer.begin(&member.name).expect("memory takes all");
-        writer.write_all(&contents).expect("memory takes all");
-        writer.end().expect("memory takes all");
-    }
-    writer.finish().expect("memory takes all").into_inner()
-}
-
 #[test]
 fn another_version_is_refused_by_its_number() {
     let text = format!(
-        r#"{{"format":"{}","version":[2,7],"more":1}}"#,
+        r#"{{"format":"{}","version":[3,7],"more":1}}"#,
         manifest::FORMAT
     );
     let error = manifest::Manifest::parse(text.as_bytes()).expect_err("of another version");
-    assert!(error.to_string().contains("version 2.7"), "{error}");
+    assert!(error.to_string().contains("version 3.7"), "{error}");
 }

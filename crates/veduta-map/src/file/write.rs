@@ -6,7 +6,7 @@ use super::container::ArchiveWriter;
 use super::guests;
 use super::manifest::{FORMAT, MANIFEST, Manifest, SPANS_FORMAT, Segment, Table, VERSION};
 use super::spans::write_span_table;
-use super::tables::{TableName, TileBatches, image_row, object_rows};
+use super::tables::{TableName, TileRows, image_row, object_rows};
 use super::tiles::tiles;
 use crate::scene::Scene;
 use crate::{Guest, Origin, SeenScene, SeenSpans, Spans, VisibilityMap};
@@ -99,7 +99,7 @@ fn write_seen<W: Write + Seek>(
         // Made again for each table: the rows of all tiles together would be as large as the map.
         let batches = tiles
             .iter()
-            .map(|tile| TileBatches::new(map, scene, tile).of(table).clone());
+            .map(|tile| TileRows::new(map, scene, tile).batch(table));
         write(table, &mut { batches })?;
     }
     let objects = scene.objects.chunks(OBJECTS_PER_BATCH);

@@ -15,7 +15,7 @@ use crate::scene::{FaceIndex, Mesh, Object, Opacities, Opacity, PlaneGroups, Sce
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use veduta_geometry::{DVec2, DVec3, DVec4, signed_area};
-use veduta_map::{Camera, Faces, ObjectId, Projection};
+use veduta_map::{Camera, Faces, ObjectId, image_from_homogeneous};
 
 /// Faces a task projects at a time: enough to hide the cost of a task, few enough to share evenly.
 const FACES_PER_TASK: usize = 16 * 1024;
@@ -105,7 +105,7 @@ impl<'a> ObjectView<'a> {
         let mut outcodes: Vec<u8> = eye
             .par_iter()
             .with_min_len(FACES_PER_TASK)
-            .map(|&point| outcode(homogeneous(camera, point), camera.near) as u8)
+            .map(|&point| outcode(camera.homogeneous(point), camera.near) as u8)
             .collect();
         let beyond_any = outcodes.par_iter().copied().reduce(|| 0, |a, b| a | b);
         let beyond_all = outcodes
@@ -123,7 +123,7 @@ impl<'a> ObjectView<'a> {
         let image = eye
             .par_iter()
             .with_min_len(FACES_PER_TASK)
-            .map(|&point| image_from_homogeneous(homogeneous(camera, point)))
+            .map(|&point| camera.image_from_eye(point))
             .collect();
         let mirrored = object.world_from_object.determinant() < 0.0;
         Self {
@@ -215,32 +215,6 @@ impl<'a> ObjectView<'a> {
     }
 }
 
-/// `(x w, y w, w, z)` of an eye-space point, where `(x, y)` is its place in the image plane.
-#[inline]
-fn homogeneous(camera: &Camera, point: DVec3) -> DVec4 {
-    let scale = camera.image_scale();
-    let ahead = camera.principal_point();
-    match camera.projection {
-        Projection::Perspective { .. } => DVec4::new(
-            point.x * scale.x + ahead.x * point.z,
-            point.y * scale.y + ahead.y * point.z,
-            point.z,
-            point.z,
-        ),
-        Projection::Parallel { .. } => DVec4::new(
-            point.x * scale.x + ahead.x,
-            point.y * scale.y + ahead.y,
-            1.0,
-            point.z,
-        ),
-    }
-}
-
-#[inline]
-fn image_from_homogeneous(point: DVec4) -> DVec2 {
-    DVec2::new(point.x / point.z, point.y / point.z)
-}
-
 /// A face clipped to the view pyramid; reused from face to face to spare allocations.
 #[derive(Default)]
 struct ClipPolygon {
@@ -254,7 +228,7 @@ impl ClipPolygon {
     fn clip(&mut self, corners: impl Iterator<Item = DVec3>, camera: &Camera) -> &[DVec2] {
         self.corners.clear();
         self.corners
-            .extend(corners.map(|point| homogeneous(camera, point)));
+            .extend(corners.map(|point| camera.homogeneous(point)));
         // Near first: what is left has positive w, so that the sides mean what they say.
         self.clip_side(|p| p.w - camera.near, |p| p);
         // Points on a side of the frame get its coordinate exactly.
@@ -305,7 +279,7 @@ mod tests {
     use crate::scene::{Material, MeshId};
     use veduta_geometry::DMat4;
     use veduta_map::FaceId;
-    use veduta_map::MaterialId;
+    use veduta_map::{MaterialId, Projection};
 
     fn scene_of(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>, double_sided: bool) -> Scene {
         let mesh = Mesh {

@@ -25,23 +25,19 @@ use half::slice::HalfFloatSliceExt;
 use header::RecordHead;
 use rayon::prelude::*;
 use std::io::{Seek, Write};
+use std::ops::Range;
 use veduta::accumulate::Picture;
 use veduta::reproject::Orientation;
 
 /// Blocks that are packed side by side before they are written.
 const BLOCKS_AT_ONCE: usize = 64;
 
-/// A channel: its name, and its value at each pixel, counted along rows from the top.
+/// A channel: its name, how its samples are stored, and those of a range of pixels, counted along rows from the top,
+/// as bytes in the machine's order.
 struct Channel<'a> {
     name: String,
-    values: Values<'a>,
-}
-
-/// How a channel is stored, and what.
-enum Values<'a> {
-    F16(Box<dyn Fn(usize) -> f32 + Sync + 'a>),
-    F32(Box<dyn Fn(usize) -> f32 + Sync + 'a>),
-    U32(Box<dyn Fn(usize) -> u32 + Sync + 'a>),
+    sample_type: SampleType,
+    append: Box<dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a>,
 }
 
 impl<'a> Channel<'a> {
@@ -51,26 +47,49 @@ impl<'a> Channel<'a> {
         samples: Samples,
         value: impl Fn(usize) -> f32 + Sync + 'a,
     ) -> Self {
-        let value = Box::new(value);
-        Self {
-            name: name.into(),
-            values: match samples {
-                Samples::F16 => Values::F16(value),
-                _ => Values::F32(value),
+        match samples {
+            Samples::F16 => Self {
+                name: name.into(),
+                sample_type: SampleType::F16,
+                append: Box::new(move |pixels, bytes| {
+                    let halves = halves(pixels.map(&value));
+                    append(halves.into_iter().map(f16::to_ne_bytes), bytes);
+                }),
             },
+            _ => Self::of_floats(name, value),
         }
     }
 
     /// A channel that half floats could not hold.
     fn of_floats(name: impl Into<String>, value: impl Fn(usize) -> f32 + Sync + 'a) -> Self {
-        let (name, values) = (name.into(), Values::F32(Box::new(value)));
-        Self { name, values }
+        Self {
+            name: name.into(),
+            sample_type: SampleType::F32,
+            append: Box::new(move |pixels, bytes| {
+                append(pixels.map(|pixel| value(pixel).to_ne_bytes()), bytes);
+            }),
+        }
     }
 
     /// A channel of whole numbers.
     fn of_numbers(name: impl Into<String>, value: impl Fn(usize) -> u32 + Sync + 'a) -> Self {
-        let (name, values) = (name.into(), Values::U32(Box::new(value)));
-        Self { name, values }
+        Self {
+            name: name.into(),
+            sample_type: SampleType::U32,
+            append: Box::new(move |pixels, bytes| {
+                append(pixels.map(|pixel| value(pixel).to_ne_bytes()), bytes);
+            }),
+        }
+    }
+}
+
+/// Appends the bytes of samples.
+fn append<const N: usize>(samples: impl ExactSizeIterator<Item = [u8; N]>, bytes: &mut Vec<u8>) {
+    let first = bytes.len();
+    bytes.resize(first + N * samples.len(), 0);
+    let (places, _) = bytes[first..].as_chunks_mut::<N>();
+    for (place, sample) in places.iter_mut().zip(samples) {
+        *place = sample;
     }
 }
 
@@ -146,14 +165,8 @@ fn world_to_camera(orientation: &Orientation) -> [f32; 16] {
 }
 
 fn header(size: Vec2<usize>, channels: &[Channel], options: &PictureOptions) -> Header {
-    let describe = |channel: &Channel| {
-        let sample_type = match channel.values {
-            Values::F16(_) => SampleType::F16,
-            Values::F32(_) => SampleType::F32,
-            Values::U32(_) => SampleType::U32,
-        };
-        ChannelDescription::named(channel.name.as_str(), sample_type)
-    };
+    let describe =
+        |channel: &Channel| ChannelDescription::named(channel.name.as_str(), channel.sample_type);
     let compression = match options.exr_compression {
         ExrCompression::None => Compression::Uncompressed,
         ExrCompression::Rle => Compression::RLE,
@@ -209,29 +222,27 @@ fn chunk(headers: &[Header], block: BlockIndex, channels: &[Channel]) -> exr::er
 
 /// The samples of a block, line by line, and of each line channel by channel.
 fn samples(header: &Header, block: BlockIndex, channels: &[Channel]) -> Vec<u8> {
-    UncompressedBlock::collect_block_data_from_lines(&header.channels, block, |line| {
-        let at = line.location.position;
-        let first = at.1 * header.layer_size.0 + at.0;
-        let written = match &channels[line.location.channel].values {
-            Values::F16(value) => {
-                let values = (first..first + line.location.sample_count).map(value);
-                let halves = halves(&values.collect::<Vec<f32>>());
-                line.write_samples(|k| halves[k])
-            }
-            Values::F32(value) => line.write_samples(|k| value(first + k)),
-            Values::U32(value) => line.write_samples(|k| value(first + k)),
-        };
-        written.expect("a line has room for its samples");
-    })
+    let (position, size) = (block.pixel_position, block.pixel_size);
+    let of_pixel: usize = channels
+        .iter()
+        .map(|channel| channel.sample_type.bytes_per_sample())
+        .sum();
+    let mut bytes = Vec::with_capacity(size.area() * of_pixel);
+    for row in position.y()..position.y() + size.height() {
+        let first = row * header.layer_size.width() + position.x();
+        for channel in channels {
+            (channel.append)(first..first + size.width(), &mut bytes);
+        }
+    }
+    bytes
 }
 
 /// The nearest f16 of each. What is too bright becomes the brightest there is: infinities would spread
 /// through every filter that follows. A line at a time, which is several times as quick as one by one.
-fn halves(values: &[f32]) -> Vec<f16> {
+fn halves(values: impl Iterator<Item = f32>) -> Vec<f16> {
     let most = f16::MAX.to_f32();
     let clamped: Vec<f32> = values
-        .iter()
-        .map(|&value| match value.is_finite() {
+        .map(|value| match value.is_finite() {
             true => value.clamp(-most, most),
             false => value,
         })
