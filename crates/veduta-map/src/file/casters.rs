@@ -8,7 +8,8 @@
 use super::FileError;
 use super::manifest::{CastersTold, EmbeddedScene};
 use super::read::MapReader;
-use super::tables::{self, Lists, Rows, TableName, Vertex};
+use super::rows::{Rows, Vertex};
+use super::tables::{self, ListColumn, TableName};
 use super::write::TableWriter;
 use crate::Casters;
 use crate::MaterialId;
@@ -206,7 +207,7 @@ impl Iterator for Batches {
 }
 
 fn mesh_rows(meshes: &[Mesh]) -> RecordBatch {
-    let [mut from, mut materials] = [(); 2].map(|()| Lists::new());
+    let [mut from, mut materials] = [(); 2].map(|()| ListColumn::new());
     for mesh in meshes {
         from.push(mesh.materials.iter().map(|range| range.0));
         materials.push(mesh.materials.iter().map(|range| range.1.0));

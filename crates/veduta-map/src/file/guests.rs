@@ -4,7 +4,8 @@
 
 use super::FileError;
 use super::manifest::GuestEntry;
-use super::tables::{Rows, TableName};
+use super::rows::Rows;
+use super::tables::TableName;
 use crate::{Guest, GuestGrid, GuestSamples};
 use arrow_array::{ArrayRef, Float32Array, Float64Array, RecordBatch, UInt32Array};
 use std::ops::Range;

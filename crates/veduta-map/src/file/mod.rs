@@ -6,7 +6,7 @@
 //! - `casters` keeps, where that is asked for, what the map does not show but what casts shadows.
 //! - `spans` is what multiscan found, in a file of another kind: in place of regions.
 //! - `guests` are pictures of other programs.
-//! - `tables` are the columns; `tiles` says which rows stand together, so that a window of the picture
+//! - `tables` are the columns, `rows` what is read of them, which `assemble` puts together; `tiles` says which rows stand together, so that a window of the picture
 //!   reads little; `projected` is what is left out since it follows from vertices; `container` is the
 //!   archive, `manifest` what else there is to know.
 //! - Every byte is under a checksum, or is compared with its only legal value, before it is decoded:
@@ -16,6 +16,7 @@
 //! Writing goes through the tables one after the other, reading through the tiles, so that neither
 //! holds more than the map itself and a tile of the file.
 
+mod assemble;
 mod casters;
 mod container;
 mod guests;
@@ -23,6 +24,7 @@ mod manifest;
 mod message;
 mod projected;
 mod read;
+mod rows;
 mod spans;
 mod tables;
 mod tiles;

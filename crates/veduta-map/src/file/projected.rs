@@ -55,21 +55,32 @@ impl<'a> Projected<'a> {
         &self.image
     }
 
-    /// The rows of a face's corners; `None` if one is not in the tile.
-    pub fn rows_of(&self, object: u32, corners: impl Iterator<Item = u32>) -> Option<Vec<usize>> {
-        corners
-            .map(|vertex| self.rows.binary_search(&(object, vertex)).ok())
-            .collect()
+    /// Overwrites `rows` with those of a face's corners; `false` if one is not in the tile, or there are not three.
+    pub fn find(
+        &self,
+        object: u32,
+        corners: impl Iterator<Item = u32>,
+        rows: &mut Vec<usize>,
+    ) -> bool {
+        rows.clear();
+        for vertex in corners {
+            match self.rows.binary_search(&(object, vertex)) {
+                Ok(row) => rows.push(row),
+                Err(_) => return false,
+            }
+        }
+        rows.len() >= 3
     }
 
-    /// The outline of a face with corners in these rows that nothing clips, wound as tables of faces have it.
-    pub fn outline(&self, corners: &[usize]) -> Vec<DVec2> {
-        let mut outline: Vec<DVec2> = corners.iter().map(|&row| self.image[row]).collect();
-        let is_turned = signed_area(&outline) <= 0.0;
+    /// Overwrites `outline` with that of a face with corners in these rows that nothing clips, wound as tables of faces
+    /// have it.
+    pub fn outline(&self, corners: &[usize], outline: &mut Vec<DVec2>) {
+        outline.clear();
+        outline.extend(corners.iter().map(|&row| self.image[row]));
+        let is_turned = signed_area(outline) <= 0.0;
         if is_turned {
             outline.reverse();
         }
-        outline
     }
 
     /// The nearness of the plane through the first three of these corners. `None` where they span none, or it is

@@ -1,26 +1,25 @@
 //! A file -> a seen scene, whole or a window of it.
 
 use super::FileError;
+use super::assemble::SeenRows;
 use super::casters;
 use super::container::{ArchiveReader, Member};
 use super::guests;
 use super::manifest::{MANIFEST, Manifest, SPANS_FORMAT, Segment, Table};
 use super::message;
 use super::projected::Projected;
+use super::rows::Rows;
 use super::spans;
-use super::tables::{FaceRow, FragmentRow, Rows, TableName, VertexRow};
-use crate::scene::{Mesh, MeshId, Object, Scene};
-use crate::{
-    Camera, FaceId, Faces, Fragments, Guest, GuestSamples, MaterialId, ObjectId, PlaneId, Reading,
-    SeenScene, SeenSpans, Side, Source, VisibilityMap,
-};
+use super::tables::TableName;
+use crate::scene::{MeshId, Object, Scene};
+use crate::{Camera, Guest, GuestSamples, Reading, SeenScene, SeenSpans, Source};
 use arrow_array::RecordBatch;
 use arrow_ipc::MetadataVersion;
 use arrow_ipc::reader::FileDecoder;
 use arrow_schema::SchemaRef;
 use std::io::{Read, Seek};
 use std::sync::Arc;
-use veduta_geometry::{Affine, DVec2};
+use veduta_geometry::DVec2;
 
 /// All heights of the image plane.
 const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
@@ -295,13 +294,11 @@ impl<R: Read + Seek> MapReader<R> {
                 &scene.objects[object as usize].world_from_object
             });
             let points = of(TableName::Points).points(&projected)?;
-            rows.faces
-                .extend(of(TableName::Faces).faces(&points, &projected)?);
+            of(TableName::Faces).faces(&points, &projected, &mut rows.faces)?;
             rows.vertices.extend(vertices);
             if of_tiles.len() == TableName::OF_TILES.len() {
-                rows.opaque
-                    .extend(of(TableName::Opaque).fragments(&points)?);
-                rows.veils.extend(of(TableName::Veils).fragments(&points)?);
+                of(TableName::Opaque).fragments(&points, &mut rows.opaque)?;
+                of(TableName::Veils).fragments(&points, &mut rows.veils)?;
             }
         }
         let guests = self.read_guests(heights)?;
@@ -517,210 +514,4 @@ pub(super) fn check_scene(scene: &Scene) -> Result<(), FileError> {
         }
     }
     Ok(())
-}
-
-/// Rows of the tiles that were read.
-#[derive(Default)]
-struct SeenRows {
-    faces: Vec<FaceRow>,
-    vertices: Vec<VertexRow>,
-    opaque: Vec<FragmentRow>,
-    veils: Vec<FragmentRow>,
-}
-
-impl SeenRows {
-    fn into_seen(mut self, mut scene: Scene, manifest: &Manifest) -> Result<SeenScene, FileError> {
-        // A face stands in each tile that names it, and its vertices with it.
-        self.faces.sort_by_key(|row| row.face);
-        self.faces.dedup();
-        self.vertices.sort_by_key(|row| (row.object, row.vertex));
-        self.vertices.dedup();
-        let faces = TableName::Faces.member();
-        let twice = |what: &str, number: u32| {
-            FileError::unsound(faces, format!("{what} {number} is told twice, differently"))
-        };
-        if let Some(pair) = self
-            .faces
-            .windows(2)
-            .find(|pair| pair[0].face == pair[1].face)
-        {
-            return Err(twice("face", pair[0].face));
-        }
-        let count = self.faces.len();
-        if manifest.sub_scanlines.is_some()
-            && let Some(last) = self.faces.last()
-            && last.face as usize + 1 != count
-        {
-            let what = format!("{count} faces, but the last is {}", last.face);
-            return Err(FileError::unsound(faces, what));
-        }
-        let key = |row: &VertexRow| (row.object, row.vertex);
-        if let Some(pair) = self
-            .vertices
-            .windows(2)
-            .find(|pair| key(&pair[0]) == key(&pair[1]))
-        {
-            return Err(twice("vertex", pair[0].vertex));
-        }
-
-        scene.meshes = vec![Mesh::default(); scene.objects.len()];
-        for row in &self.vertices {
-            let mesh = scene.meshes.get_mut(row.object as usize);
-            if !mesh.is_some_and(|mesh| row.at.push_to(mesh)) {
-                let what = format!(
-                    "vertex {} of object {} does not fit",
-                    row.vertex, row.object
-                );
-                return Err(FileError::unsound(TableName::Vertices.member(), what));
-            }
-        }
-        let table = self.face_table(&mut scene)?;
-        for mesh in scene.meshes.iter().filter(|mesh| mesh.face_count() > 0) {
-            let sound = mesh.check();
-            sound.map_err(|error| FileError::unsound(faces, error.to_string()))?;
-        }
-        let numbers: Vec<u32> = self.faces.iter().map(|row| row.face).collect();
-        let new_id = |face: u32| place_of(face, &numbers, |&face| face).map(FaceId::from_index);
-        Ok(SeenScene {
-            map: VisibilityMap {
-                camera: manifest.camera,
-                opaque: fragments(self.opaque, TableName::Opaque, &table, false, new_id)?,
-                veils: fragments(self.veils, TableName::Veils, &table, true, new_id)?,
-                faces: table,
-            },
-            scene,
-            size: manifest.size,
-            has_holes: manifest.has_holes,
-            guests: Vec::new(),
-        })
-    }
-
-    /// The faces in their order, numbered anew; they are added to the meshes of their objects.
-    fn face_table(&self, scene: &mut Scene) -> Result<Faces, FileError> {
-        let unsound = |what: String| FileError::unsound(TableName::Faces.member(), what);
-        let mut table = Faces::with_capacity(self.faces.len());
-        let mut planes: Vec<(u32, Affine)> = self
-            .faces
-            .iter()
-            .map(|row| (row.plane, row.nearness))
-            .collect();
-        planes.sort_by_key(|&(plane, _)| plane);
-        planes.dedup();
-        if let Some(pair) = planes.windows(2).find(|pair| pair[0].0 == pair[1].0) {
-            let what = format!("plane {} is told twice, differently", pair[0].0);
-            return Err(unsound(what));
-        }
-        let ids: Vec<PlaneId> = planes
-            .iter()
-            .map(|&(_, nearness)| table.push_plane(nearness))
-            .collect();
-        // Vertices ascend, and those of the faces at hand were read with them.
-        let mut of_objects: Vec<&[VertexRow]> = vec![&[]; scene.objects.len()];
-        for rows in self.vertices.chunk_by(|a, b| a.object == b.object) {
-            of_objects[rows[0].object as usize] = rows;
-        }
-        for row in &self.faces {
-            let misfit = |what: &str| unsound(format!("face {}: {what}", row.face));
-            if row.material as usize >= scene.materials.len() {
-                return Err(misfit("its material is not there"));
-            }
-            let mesh = scene.meshes.get_mut(row.object as usize);
-            let mesh = mesh.ok_or_else(|| misfit("its object is not there"))?;
-            let vertices = of_objects[row.object as usize];
-            let corner = |&vertex: &u32| {
-                let place = place_of(vertex, vertices, |row| row.vertex);
-                place.map(|index| index as u32)
-            };
-            let corners: Option<Vec<u32>> = row.corners.iter().map(corner).collect();
-            let corners = corners.filter(|corners| corners.len() >= 3);
-            let corners = corners.ok_or_else(|| misfit("its corners are not there"))?;
-            let source = mesh.face_count() as u32;
-            mesh.push_fan(&corners);
-            let material = MaterialId(row.material);
-            if mesh.materials.last().is_none_or(|last| last.1 != material) {
-                mesh.materials.push((source, material));
-            }
-            if row.outline.len() < 3 {
-                return Err(misfit("its outline is not a polygon"));
-            }
-            // The table would turn it, and its sides would be others.
-            let area = veduta_geometry::signed_area(&row.outline);
-            if area.is_nan() || area <= 0.0 {
-                return Err(misfit("its outline has no area or is not wound clockwise"));
-            }
-            let object = ObjectId(row.object);
-            let plane = place_of(row.plane, &planes, |&(plane, _)| plane);
-            let plane = ids[plane.expect("planes of all faces")];
-            let id = table.push(&row.outline, plane, object, source);
-            let id = id.ok_or_else(|| misfit("its outline has no area"))?;
-            if !row.opaque {
-                table.set_veil(id);
-            }
-        }
-        Ok(table)
-    }
-}
-
-/// Where in rows, whose numbers ascend, one with this number stands. In what is read as a whole that is its number.
-fn place_of<T>(number: u32, rows: &[T], number_of: impl Fn(&T) -> u32) -> Option<usize> {
-    let there = number as usize;
-    match rows.get(there).is_some_and(|row| number_of(row) == number) {
-        true => Some(there),
-        false => rows.binary_search_by_key(&number, number_of).ok(),
-    }
-}
-
-/// Fragments in the order of their faces.
-fn fragments(
-    mut rows: Vec<FragmentRow>,
-    name: TableName,
-    faces: &Faces,
-    veils: bool,
-    new_id: impl Fn(u32) -> Option<FaceId>,
-) -> Result<Fragments, FileError> {
-    let unsound = |what: String| FileError::unsound(name.member(), what);
-    // All fragments of a face stand in one tile, in order.
-    rows.sort_by_key(|row| row.face);
-    let mut fragments = Fragments::new();
-    let mut last: Option<(FaceId, bool)> = None;
-    for row in &rows {
-        let missing = || unsound(format!("face {} is not there", row.face));
-        let face = new_id(row.face).ok_or_else(missing)?;
-        if faces.is_veil(face) != veils {
-            return Err(unsound(format!(
-                "face {} belongs to the other table",
-                row.face
-            )));
-        }
-        let whole = row.vertices.is_empty();
-        if last.is_some_and(|(before, was_whole)| before == face && (whole || was_whole)) {
-            return Err(unsound(format!(
-                "face {} is seen whole and again",
-                row.face
-            )));
-        }
-        last = Some((face, whole));
-        if whole {
-            fragments.push_whole(face);
-            continue;
-        }
-        let mut sides = Vec::with_capacity(row.sides.len());
-        for side in &row.sides {
-            let cutter = new_id(side.face.0).ok_or_else(missing)?;
-            let is_kind =
-                side.kind >= Side::SCAN || (side.kind as usize) < faces.outline(cutter).len();
-            if !is_kind {
-                return Err(unsound(format!(
-                    "face {} has no side {}",
-                    side.face.0, side.kind
-                )));
-            }
-            sides.push(Side {
-                face: cutter,
-                ..*side
-            });
-        }
-        fragments.push_cut(face, row.vertices.iter().copied().zip(sides));
-    }
-    Ok(fragments)
 }

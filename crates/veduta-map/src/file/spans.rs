@@ -2,7 +2,8 @@
 
 use super::FileError;
 use super::read::MapReader;
-use super::tables::{self, Rows};
+use super::rows::Rows;
+use super::tables;
 use super::write::TableWriter;
 use crate::{FaceId, SeenScene, SeenSpans, Span, SpanBand, Spans};
 use arrow_array::{ArrayRef, Float64Array, RecordBatch};

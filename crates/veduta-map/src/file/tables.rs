@@ -1,21 +1,19 @@
-//! The tables of a file: their columns, and rows <-> batches.
+//! The tables of a file: their columns, and a seen scene -> batches.
 
 use super::FileError;
 use super::projected::{Projected, same_nearness, same_points};
 use super::tiles::Tile;
 use crate::scene::{Image, Mesh, Object, Scene};
-use crate::{FaceId, Fragment, Fragments, ObjectId, Side, VisibilityMap};
+use crate::{FaceId, Fragment, Fragments, ObjectId, VisibilityMap};
 use arrow_array::builder::{FixedSizeListBuilder, Float64Builder, ListBuilder, UInt32Builder};
-use arrow_array::cast::AsArray;
-use arrow_array::types::{Float32Type, Float64Type, UInt32Type};
 use arrow_array::{
-    Array, ArrayRef, BooleanArray, Float32Array, Float64Array, LargeBinaryArray, ListArray,
-    RecordBatch, StringArray, UInt32Array,
+    ArrayRef, BooleanArray, Float32Array, Float64Array, LargeBinaryArray, RecordBatch, StringArray,
+    UInt32Array,
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 use std::collections::HashMap;
 use std::sync::Arc;
-use veduta_geometry::{Affine, DMat4, DVec2, DVec3, Vec2, Vec3};
+use veduta_geometry::{Affine, DVec2, DVec3};
 
 /// A member that holds a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,7 +125,7 @@ impl TableName {
 }
 
 /// Columns of vertices that are empty where the mesh has no such attribute.
-const ATTRIBUTES: [&str; 11] = [
+pub const ATTRIBUTES: [&str; 11] = [
     "nx", "ny", "nz", "u", "v", "u2", "v2", "r", "g", "b", "opacity",
 ];
 
@@ -156,9 +154,9 @@ fn matrix_type() -> DataType {
 }
 
 /// Lists of numbers, one after the other.
-pub struct Lists(ListBuilder<UInt32Builder>);
+pub struct ListColumn(ListBuilder<UInt32Builder>);
 
-impl Lists {
+impl ListColumn {
     pub fn new() -> Self {
         let field = Field::new_list_field(DataType::UInt32, false);
         Self(ListBuilder::new(UInt32Builder::new()).with_field(field))
@@ -239,16 +237,19 @@ impl<'a> TileRows<'a> {
 
     fn face_rows(&self, projected: &Projected, points: &mut PointRows) -> RecordBatch {
         let (table, faces) = (&self.map.faces, &self.faces);
-        let (mut outlines, mut corners) = (Lists::new(), Lists::new());
+        let (mut outlines, mut corners) = (ListColumn::new(), ListColumn::new());
         let mut materials = Vec::with_capacity(faces.len());
         let mut planes = Vec::with_capacity(faces.len());
+        let (mut rows, mut follows) = (Vec::new(), Vec::new());
         for &face in faces {
             let mesh = self.scene.mesh_of(table.object(face));
             let source = table.source(face);
-            let rows = projected.rows_of(table.object(face).0, mesh.corners_of(source));
-            let rows = rows.expect("corners of all faces");
+            let object = table.object(face).0;
+            let are_there = projected.find(object, mesh.corners_of(source), &mut rows);
+            assert!(are_there, "a tile has the corners of all of its faces");
             let outline = table.outline(face);
-            if same_points(&projected.outline(&rows), outline) {
+            projected.outline(&rows, &mut follows);
+            if same_points(&follows, outline) {
                 outlines.push(std::iter::empty());
             } else {
                 outlines.push(outline.iter().map(|&point| points.row_of(point)));
@@ -349,7 +350,7 @@ fn fragment_rows(
     indices: &[u32],
     points: &mut PointRows,
 ) -> RecordBatch {
-    let [mut outlines, mut side_faces, mut side_kinds] = [(); 3].map(|()| Lists::new());
+    let [mut outlines, mut side_faces, mut side_kinds] = [(); 3].map(|()| ListColumn::new());
     for &index in indices {
         let (vertices, sides) = match fragments.get(index as usize) {
             Fragment::Whole(_) => (&[][..], &[][..]),
@@ -423,329 +424,6 @@ pub fn image_row(image: &Image) -> RecordBatch {
             .pixels
             .as_flattened()])),
     ])
-}
-
-/// A batch that was read, and what to say of it if it is not as it should be.
-pub struct Rows<'a> {
-    pub batch: &'a RecordBatch,
-    pub member: &'static str,
-    pub index: usize,
-}
-
-impl Rows<'_> {
-    /// An error about these rows.
-    pub fn unsound(&self, what: impl std::fmt::Display) -> FileError {
-        FileError::unsound(self.member, format!("batch {}: {what}", self.index))
-    }
-
-    fn column<'a, A: Array + 'static>(
-        &'a self,
-        name: &str,
-        cast: impl Fn(&'a ArrayRef) -> Option<&'a A>,
-    ) -> Result<&'a A, FileError> {
-        let column = self.batch.column_by_name(name).and_then(cast);
-        column.ok_or_else(|| self.unsound(format_args!("no column `{name}` of the right type")))
-    }
-
-    /// A column without gaps.
-    fn full<'a, A: Array + 'static>(
-        &'a self,
-        name: &str,
-        cast: impl Fn(&'a ArrayRef) -> Option<&'a A>,
-    ) -> Result<&'a A, FileError> {
-        let column = self.column(name, cast)?;
-        if column.null_count() > 0 {
-            return Err(self.unsound(format_args!("a gap in the column `{name}`")));
-        }
-        Ok(column)
-    }
-
-    pub fn numbers(&self, name: &str) -> Result<&[u32], FileError> {
-        let column = self.full(name, |column| column.as_primitive_opt::<UInt32Type>())?;
-        Ok(column.values())
-    }
-
-    pub fn booleans(&self, name: &str) -> Result<&BooleanArray, FileError> {
-        self.full(name, |column| column.as_boolean_opt())
-    }
-
-    pub fn reals(&self, name: &str) -> Result<&[f64], FileError> {
-        let column = self.full(name, |column| column.as_primitive_opt::<Float64Type>())?;
-        if column.values().iter().any(|value| !value.is_finite()) {
-            return Err(self.unsound(format_args!("a number in `{name}` is not finite")));
-        }
-        Ok(column.values())
-    }
-
-    /// Numbers of single precision.
-    pub fn floats(&self, name: &str) -> Result<&[f32], FileError> {
-        let column = self.full(name, |column| column.as_primitive_opt::<Float32Type>())?;
-        Ok(column.values())
-    }
-
-    pub fn lists(&self, name: &str) -> Result<NumberLists<'_>, FileError> {
-        let lists: &ListArray = self.full(name, |column| column.as_list_opt::<i32>())?;
-        let numbers = lists.values().as_primitive_opt::<UInt32Type>();
-        let numbers = numbers.filter(|numbers| numbers.null_count() == 0);
-        let numbers = numbers
-            .ok_or_else(|| self.unsound(format_args!("no numbers in the lists `{name}`")))?;
-        Ok(NumberLists {
-            ends: lists.value_offsets(),
-            numbers: numbers.values(),
-        })
-    }
-
-    /// The points of a tile after those of its vertices.
-    pub fn points(&self, projected: &Projected) -> Result<Vec<DVec2>, FileError> {
-        let (x, y) = (self.reals("x")?, self.reals("y")?);
-        let told = x.iter().zip(y).map(|(&x, &y)| DVec2::new(x, y));
-        Ok(projected.image().iter().copied().chain(told).collect())
-    }
-
-    /// The faces of a tile; outlines are of `points`, or, like planes, follow from vertices.
-    pub fn faces(
-        &self,
-        points: &[DVec2],
-        projected: &Projected,
-    ) -> Result<Vec<FaceRow>, FileError> {
-        let (face, object) = (self.numbers("face")?, self.numbers("object")?);
-        let (material, plane) = (self.numbers("material")?, self.numbers("plane")?);
-        let opaque = self.booleans("opaque")?;
-        let nearness = [self.gappy("a")?, self.gappy("b")?, self.gappy("c")?];
-        let (outlines, corners) = (self.lists("outline")?, self.lists("corners")?);
-        (0..face.len())
-            .map(|row| {
-                let misfit = |what: &str| self.unsound(format_args!("face {}: {what}", face[row]));
-                let corners = corners.of(row);
-                let rows = projected.rows_of(object[row], corners.iter().copied());
-                let rows = rows.filter(|rows| rows.len() >= 3);
-                let rows = rows.ok_or_else(|| misfit("its corners are not there"))?;
-                let nearness = match nearness.map(|column| column.is_valid(row)) {
-                    [true, true, true] => {
-                        let [a, b, c] = nearness.map(|column| column.value(row));
-                        Affine::new(a, b, c)
-                    }
-                    [false, false, false] => projected
-                        .nearness(&rows)
-                        .ok_or_else(|| misfit("its corners tell no plane"))?,
-                    _ => return Err(misfit("a part of its plane is missing")),
-                };
-                let outline = match outlines.of(row) {
-                    [] => projected.outline(&rows),
-                    told => self.outline(told, points)?,
-                };
-                if !outline.iter().all(|point| point.is_finite()) {
-                    return Err(misfit("a corner of it has no place in the picture"));
-                }
-                Ok(FaceRow {
-                    face: face[row],
-                    object: object[row],
-                    material: material[row],
-                    opaque: opaque.value(row),
-                    plane: plane[row],
-                    nearness,
-                    outline,
-                    corners: corners.to_vec(),
-                })
-            })
-            .collect()
-    }
-
-    /// Real numbers, some of which may be missing.
-    fn gappy(&self, name: &str) -> Result<&Float64Array, FileError> {
-        let column: &Float64Array =
-            self.column(name, |column| column.as_primitive_opt::<Float64Type>())?;
-        if column.iter().flatten().any(|value| !value.is_finite()) {
-            return Err(self.unsound(format_args!("a number in `{name}` is not finite")));
-        }
-        Ok(column)
-    }
-
-    fn outline(&self, rows: &[u32], points: &[DVec2]) -> Result<Vec<DVec2>, FileError> {
-        let point = |&row: &u32| {
-            let point = points.get(row as usize).copied();
-            point.filter(|point| point.is_finite())
-        };
-        let outline: Option<Vec<DVec2>> = rows.iter().map(point).collect();
-        outline.ok_or_else(|| self.unsound("an outline names a point that is not there"))
-    }
-
-    /// The fragments of a tile; outlines are of `points`.
-    pub fn fragments(&self, points: &[DVec2]) -> Result<Vec<FragmentRow>, FileError> {
-        let face = self.numbers("face")?;
-        let outlines = self.lists("outline")?;
-        let (side_faces, side_kinds) = (self.lists("side_face")?, self.lists("side_kind")?);
-        (0..face.len())
-            .map(|row| {
-                let vertices = self.outline(outlines.of(row), points)?;
-                let (faces, kinds) = (side_faces.of(row), side_kinds.of(row));
-                let is_whole = vertices.is_empty() && faces.is_empty() && kinds.is_empty();
-                let fits = vertices.len() == faces.len() && faces.len() == kinds.len();
-                if !(is_whole || fits && vertices.len() >= 3) {
-                    return Err(
-                        self.unsound(format_args!("fragment {row} has no side for each vertex"))
-                    );
-                }
-                let sides = faces.iter().zip(kinds).map(|(&face, &kind)| Side {
-                    face: FaceId(face),
-                    kind,
-                });
-                Ok(FragmentRow {
-                    face: face[row],
-                    vertices,
-                    sides: sides.collect(),
-                })
-            })
-            .collect()
-    }
-
-    /// The vertices of a tile.
-    pub fn vertices(&self) -> Result<Vec<VertexRow>, FileError> {
-        let (object, vertex) = (self.numbers("object")?, self.numbers("vertex")?);
-        let rows = object.iter().zip(vertex).zip(self.vertex_columns()?);
-        Ok(rows
-            .map(|((&object, &vertex), at)| VertexRow { object, vertex, at })
-            .collect())
-    }
-
-    /// What [`vertex_fields`] tell.
-    pub fn vertex_columns(&self) -> Result<Vec<Vertex>, FileError> {
-        let (x, y, z) = (self.reals("x")?, self.reals("y")?, self.reals("z")?);
-        let columns: Result<Vec<&Float32Array>, FileError> = ATTRIBUTES
-            .iter()
-            .map(|name| self.column(name, |column| column.as_primitive_opt::<Float32Type>()))
-            .collect();
-        let columns = columns?;
-        Ok((0..x.len())
-            .map(|row| Vertex {
-                position: DVec3::new(x[row], y[row], z[row]),
-                attributes: std::array::from_fn(|attribute| {
-                    let column = columns[attribute];
-                    column.is_valid(row).then(|| column.value(row).to_bits())
-                }),
-            })
-            .collect())
-    }
-
-    /// A batch of objects, without meshes.
-    pub fn objects(&self) -> Result<Vec<(String, DMat4)>, FileError> {
-        let names = self.full("name", |column| column.as_string_opt::<i32>())?;
-        let matrices = self.full("world_from_object", |column| {
-            column.as_fixed_size_list_opt()
-        })?;
-        let values = matrices.values().as_primitive_opt::<Float64Type>();
-        let values = values.filter(|values| {
-            matrices.value_length() == 16
-                && values.null_count() == 0
-                && values.len() == 16 * names.len()
-        });
-        let values = values.ok_or_else(|| self.unsound("the matrices are not 16 numbers each"))?;
-        let (matrices, _) = values.values().as_chunks::<16>();
-        Ok(names
-            .iter()
-            .flatten()
-            .map(str::to_owned)
-            .zip(matrices.iter().map(DMat4::from_cols_array))
-            .collect())
-    }
-
-    /// An image.
-    pub fn image(&self) -> Result<Image, FileError> {
-        let (width, height) = (self.numbers("width")?, self.numbers("height")?);
-        let name = self.full("name", |column| column.as_string_opt::<i32>())?;
-        let bytes = self.full("rgba", |column| column.as_binary_opt::<i64>())?;
-        let ([width], [height]) = (width, height) else {
-            return Err(self.unsound("not one image"));
-        };
-        let (pixels, rest) = bytes.value(0).as_chunks::<4>();
-        let expected = u64::from(*width) * u64::from(*height);
-        if expected == 0 || pixels.len() as u64 != expected || !rest.is_empty() {
-            return Err(self.unsound(format_args!("the image is not {width} x {height} pixels")));
-        }
-        Ok(Image {
-            name: name.value(0).to_owned(),
-            width: *width,
-            height: *height,
-            pixels: pixels.to_vec(),
-        })
-    }
-}
-
-/// A column of lists.
-pub struct NumberLists<'a> {
-    ends: &'a [i32],
-    numbers: &'a [u32],
-}
-
-impl<'a> NumberLists<'a> {
-    pub fn of(&self, row: usize) -> &'a [u32] {
-        &self.numbers[self.ends[row] as usize..self.ends[row + 1] as usize]
-    }
-}
-
-/// A row of `faces.arrow`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FaceRow {
-    pub face: u32,
-    pub object: u32,
-    pub material: u32,
-    pub opaque: bool,
-    pub plane: u32,
-    pub nearness: Affine,
-    pub outline: Vec<DVec2>,
-    pub corners: Vec<u32>,
-}
-
-/// A row of `opaque.arrow` or `veils.arrow`; without vertices the face is seen whole.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FragmentRow {
-    pub face: u32,
-    pub vertices: Vec<DVec2>,
-    pub sides: Vec<Side>,
-}
-
-/// A row of `vertices.arrow`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct VertexRow {
-    pub object: u32,
-    pub vertex: u32,
-    pub at: Vertex,
-}
-
-/// Where a vertex is, and what it looks like.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Vertex {
-    pub position: DVec3,
-    /// As bits, so that equal rows are equal whatever they hold.
-    attributes: [Option<u32>; ATTRIBUTES.len()],
-}
-
-impl Vertex {
-    /// Adds the vertex to a mesh; `false` if it has other attributes than those before it.
-    pub fn push_to(&self, mesh: &mut Mesh) -> bool {
-        let attributes = self.attributes.map(|bits| bits.map(f32::from_bits));
-        let [nx, ny, nz, u, v, u2, v2, r, g, b, opacity] = attributes;
-        mesh.positions.push(self.position);
-        mesh.normals.extend(all([nx, ny, nz]).map(Vec3::from));
-        mesh.texcoords.extend(all([u, v]).map(Vec2::from));
-        mesh.second_texcoords.extend(all([u2, v2]).map(Vec2::from));
-        mesh.colors.extend(all([r, g, b]));
-        mesh.opacities.extend(opacity);
-        let count = mesh.positions.len();
-        let lengths = [
-            mesh.normals.len(),
-            mesh.texcoords.len(),
-            mesh.second_texcoords.len(),
-            mesh.colors.len(),
-            mesh.opacities.len(),
-        ];
-        lengths.iter().all(|&length| length == 0 || length == count)
-    }
-}
-
-fn all<const N: usize>(values: [Option<f32>; N]) -> Option<[f32; N]> {
-    let present = values.iter().all(Option::is_some);
-    present.then(|| values.map(Option::unwrap_or_default))
 }
 
 impl From<ArrowError> for FileError {
