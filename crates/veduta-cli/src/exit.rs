@@ -79,9 +79,6 @@ impl From<ReadError> for Failure {
 impl From<MapFileError> for Failure {
     fn from(error: MapFileError) -> Self {
         let code = match error.problem {
-            FileError::Io { ref source, .. } if source.kind() == io::ErrorKind::NotFound => {
-                Code::Missing
-            }
             FileError::Io { .. } => Code::InputOutput,
             FileError::Version { .. } => Code::Unsupported,
             _ => Code::BadInput,

@@ -16,6 +16,7 @@ use std::num::NonZeroUsize;
 use std::panic::{self, AssertUnwindSafe};
 use std::path::Path;
 use std::process::ExitCode;
+use std::thread::available_parallelism;
 use talk::{ProgressStyle, Talk, say_error};
 use veduta_io::PictureFormat;
 
@@ -55,7 +56,8 @@ struct Common {
     /// Tell what was done as JSON on stdout
     #[arg(long, global = true)]
     json: bool,
-    /// Number of threads; as many as processors by default. Results do not depend on it
+    /// Number of threads; as many as processors by default. Results do not depend on it, and more than a
+    /// few for each processor are not started
     #[arg(long, global = true, value_name = "N")]
     threads: Option<NonZeroUsize>,
     /// How to show progress on stderr
@@ -133,6 +135,10 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
         None
     } else if PictureFormat::of(Path::new(word)).is_ok() {
         Some(format!("the picture to write is named by -o: -o {word}"))
+    } else if word.starts_with('-') && word.parse::<f64>().is_ok() {
+        Some(format!(
+            "a value below 0 is joined to its option by =: --option={word}"
+        ))
     } else if word.parse::<f64>().is_ok() {
         Some("coordinates are one word: 1,2,3".to_owned())
     } else {
@@ -145,10 +151,15 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
     error
 }
 
+/// The most threads that are started for each processor.
+const THREADS_PER_PROCESSOR: usize = 8;
+
 fn run(arguments: Arguments) -> Result<Ending, Failure> {
     let common = &arguments.common;
     if let Some(threads) = common.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get());
+        // Those that wait for work take as much time as those that have some.
+        let most = THREADS_PER_PROCESSOR * available_parallelism().map_or(1, NonZeroUsize::get);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.get().min(most));
         let started = pool.build_global();
         started.map_err(|error| Failure::new(Code::InputOutput, format!("threads: {error}")))?;
     }

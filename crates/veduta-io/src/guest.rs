@@ -4,7 +4,7 @@
 //! pixel; any flat picture is a card at a depth. Where a file tells its camera it must be that of the
 //! composite; what is taken for granted is told, among the warnings.
 
-use crate::deep_exr::{DeepFile, is_deep};
+use crate::deep_exr::{DeepFile, IdNames, is_deep};
 use crate::depth_picture::{DepthKind, DepthOptions, DepthPicture, read_depth_picture};
 use crate::read_picture::{PictureProblem, ReadPictureError, read_picture};
 use std::fs::File;
@@ -147,10 +147,18 @@ fn deep(
         };
         nearness_of_depth(&camera, planar * options.depth.metres_per_unit)
     };
+    let names = IdNames::of(header).unwrap_or_else(|problem| {
+        warnings.push(format!("its objects have no names: {problem}"));
+        None
+    });
     let samples = file
-        .guest_samples(0, nearness)
+        .guest_samples(0, names.as_ref(), nearness)
         .map_err(PictureProblem::Deep)?;
-    finish(name, GuestKind::Deep, grid, samples, camera, warnings)
+    let objects = names
+        .into_iter()
+        .flat_map(|names| names.names.into_values());
+    let (kind, objects) = (GuestKind::Deep, objects.collect());
+    finish(name, kind, grid, samples, objects, camera, warnings)
 }
 
 /// A picture with a depth in each pixel: a sample for each pixel that is not empty.
@@ -170,7 +178,8 @@ fn depths(
     let camera = camera_of(file_camera, grid.frame, 1.0, options, &mut warnings)?;
     let nearness = |pixel: usize| nearness_of_depth(&camera, f64::from(depth[pixel]));
     let samples = flat_samples(&picture, nearness);
-    finish(name, GuestKind::Depth, grid, samples, camera, warnings)
+    let (kind, objects) = (GuestKind::Depth, Vec::new());
+    finish(name, kind, grid, samples, objects, camera, warnings)
 }
 
 /// A flat picture all of which lies at one depth.
@@ -186,7 +195,8 @@ fn card(
     let camera = camera_of(own, grid.frame, 1.0, options, &mut warnings)?;
     let nearness = nearness_of_depth(&camera, depth);
     let samples = flat_samples(picture, |_| nearness);
-    finish(name, GuestKind::Card, grid, samples, camera, warnings)
+    let (kind, objects) = (GuestKind::Card, Vec::new());
+    finish(name, kind, grid, samples, objects, camera, warnings)
 }
 
 fn whole_frame(picture: &Picture) -> GuestGrid {
@@ -217,10 +227,11 @@ fn finish(
     kind: GuestKind,
     grid: GuestGrid,
     samples: GuestSamples,
+    objects: Vec<String>,
     camera: Camera,
     warnings: Vec<String>,
 ) -> Result<LoadedGuest, PictureProblem> {
-    let guest = Guest::new(name, kind, grid, samples, Vec::new()).map_err(GuestProblem::Unsound)?;
+    let guest = Guest::new(name, kind, grid, samples, objects).map_err(GuestProblem::Unsound)?;
     Ok(LoadedGuest {
         guest,
         camera,

@@ -260,6 +260,27 @@ impl Guest {
         &self.objects
     }
 
+    /// The guest without the samples of objects whose names `keep` does not want. Samples of no object stay.
+    pub fn selected(&self, keep: impl Fn(&str) -> bool) -> Self {
+        let is_kept: Vec<bool> = self.objects.iter().map(|name| keep(name)).collect();
+        let all = &self.samples;
+        let mut samples = GuestSamples::default();
+        for pixel in 0..self.grid.pixel_count() {
+            for sample in self.samples_of(pixel) {
+                let object = all.object[sample];
+                if object == Self::NO_OBJECT || is_kept[object as usize] {
+                    let depths = [all.near[sample], all.far[sample]];
+                    samples.push(depths, all.opacity[sample], all.color[sample], object);
+                }
+            }
+            samples.end_pixel();
+        }
+        Self {
+            samples,
+            ..self.clone()
+        }
+    }
+
     /// The samples of a pixel (row * columns + column).
     #[inline]
     pub fn samples_of(&self, pixel: usize) -> Range<usize> {
@@ -332,6 +353,25 @@ mod tests {
         };
         let none = Guest::new("a".into(), GuestKind::Card, grid, samples(), Vec::new());
         assert_eq!(none, Err(GuestError::NoPixels));
+    }
+
+    #[test]
+    fn of_objects_that_are_not_wanted_no_sample_is_left() {
+        let mut samples = GuestSamples::default();
+        for pixel in 0..8 {
+            for object in [0, 1, Guest::NO_OBJECT] {
+                samples.push([2.0, 1.0], 0.5, [pixel as f32; 3], object);
+            }
+            samples.end_pixel();
+        }
+        let names = vec!["a/b".to_owned(), "c".to_owned()];
+        let guest = Guest::new("a".into(), GuestKind::Deep, grid(), samples, names);
+        let guest = guest.expect("sound").selected(|name| name != "c");
+        for pixel in 0..8 {
+            let objects = guest.samples_of(pixel).map(|k| guest.samples().object[k]);
+            assert_eq!(objects.collect::<Vec<_>>(), [0, Guest::NO_OBJECT]);
+        }
+        assert_eq!(guest.objects().len(), 2);
     }
 
     #[test]

@@ -133,7 +133,11 @@ impl SeenScene {
         };
         Self {
             has_holes: self.has_holes || is_wanted.contains(&false),
-            guests: self.guests.clone(),
+            guests: self
+                .guests
+                .iter()
+                .map(|guest| guest.selected(&wanted))
+                .collect(),
             ..Self::of(&self.scene, &map, self.size)
         }
     }

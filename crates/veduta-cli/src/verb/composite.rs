@@ -387,18 +387,43 @@ impl Composite {
         })
     }
 
-    /// Leaves the objects asked for in the maps; a name that no object has is an error.
+    /// Leaves the objects asked for in the maps, and in the pictures of other programs that name theirs; a name
+    /// that no object has is an error.
     fn select(&self, maps: &mut [SeenScene]) -> Result<(), Failure> {
         let options = [&self.holdout, &self.inside, &self.outside, &self.atop];
         let shown = maps.len() - options.map(Vec::len).iter().sum::<usize>();
-        let objects = || maps.iter().flat_map(|seen| &seen.scene.objects);
+        let objects: Vec<&str> = maps
+            .iter()
+            .flat_map(|seen| &seen.scene.objects)
+            .map(|object| object.name.as_str())
+            .collect();
+        let guests = maps.iter().flat_map(|seen| &seen.guests);
+        let of_guests: Vec<&str> = guests
+            .flat_map(|guest| guest.objects())
+            .map(String::as_str)
+            .collect();
         for names in self.only.iter().chain(&self.without).chain(&self.matte) {
-            if !objects().any(|object| names.match_name(&object.name)) {
-                let known = objects().map(|object| object.name.as_str());
-                let help = unknown_name(names.text(), "objects", known.collect::<Vec<_>>());
+            let is_named = |names: &ObjectNames, list: &[&str]| {
+                list.iter().any(|&name| names.match_name(name))
+            };
+            if !is_named(names, &objects) && !is_named(names, &of_guests) {
+                let known = [&objects[..], &of_guests[..]].concat();
+                let help = unknown_name(names.text(), "objects", known);
                 let message = format!("no object of the maps is called {:?}; {help}", names.text());
                 return Err(Failure::new(Code::Missing, message));
             }
+        }
+        if let Some(names) = self
+            .matte
+            .iter()
+            .find(|names| of_guests.iter().any(|&name| names.match_name(name)))
+        {
+            let message = format!(
+                "--matte {:?} names objects of pictures of other programs, which hide by depth only; leave \
+                 them out by --without, or make the matte of a map",
+                names.text()
+            );
+            return Err(Failure::new(Code::Unsupported, message));
         }
         let is_of =
             |list: &[ObjectNames], name: &str| list.iter().any(|names| names.match_name(name));
@@ -411,10 +436,11 @@ impl Composite {
         if self.only.is_empty() && self.without.is_empty() {
             return Ok(());
         }
+        let is_kept = |name: &str| {
+            (self.only.is_empty() || is_of(&self.only, name)) && !is_of(&self.without, name)
+        };
         for seen in maps.iter_mut().take(shown) {
-            *seen = seen.selected(|name| {
-                (self.only.is_empty() || is_of(&self.only, name)) && !is_of(&self.without, name)
-            });
+            *seen = seen.selected(is_kept);
         }
         Ok(())
     }

@@ -159,6 +159,7 @@ impl Look {
                 Backdrop::Picture(loaded.picture)
             }
         };
+        let has_materials = !scene.materials.is_empty();
         Ok(Development {
             backdrop,
             exposure: self.exposure,
@@ -166,7 +167,8 @@ impl Look {
                 ToneArgument::None => Tone::None,
                 ToneArgument::Filmic => Tone::Filmic,
             }),
-            unlit: self.unlit || scene.materials.iter().all(|material| material.unlit),
+            // Pictures of other programs, which have no materials here, are lit.
+            unlit: self.unlit || has_materials && scene.materials.iter().all(|m| m.unlit),
         })
     }
 }

@@ -1,5 +1,6 @@
 //! What the verbs that work with stored maps share.
 
+use super::guests::GuestInput;
 use super::look::Look;
 use super::refuse_to_replace;
 use crate::exit::{Code, Failure};
@@ -24,6 +25,18 @@ use veduta_io::{
 
 /// Opens a stored map; a file of another kind is refused with what to do.
 pub fn open(path: &Path) -> Result<OpenMap, Failure> {
+    if GuestInput::of(path)?.is_some() {
+        let message = format!(
+            "{}: a picture, where a stored map (.veduta) is needed: pictures of other programs are inputs of \
+             veduta composite only, which hide by depth",
+            path.display()
+        );
+        return Err(Failure::new(Code::Usage, message));
+    }
+    if path.is_dir() {
+        let message = format!("{}: a folder, not a stored map (.veduta)", path.display());
+        return Err(Failure::new(Code::Usage, message));
+    }
     if !is_map(path) {
         let message = format!(
             "{}: not a stored map (.veduta); `veduta render {} -o map.veduta` makes one of a scene",

@@ -37,20 +37,6 @@ impl DeepCompression {
     }
 }
 
-/// What a file promises of the samples of each pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DeepImageState {
-    /// Nothing.
-    #[default]
-    Messy,
-    /// They are sorted by depth.
-    Sorted,
-    /// They do not overlap.
-    NonOverlapping,
-    /// They are sorted and do not overlap.
-    Tidy,
-}
-
 /// An attribute as it is in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Attribute {
@@ -163,32 +149,6 @@ impl DeepHeader {
     pub fn set_attribute(&mut self, attribute: Attribute) {
         self.attributes.retain(|other| other.name != attribute.name);
         self.attributes.push(attribute);
-    }
-
-    /// What the file promises of its samples; nothing, if it does not say.
-    pub fn state(&self) -> DeepImageState {
-        let attribute = self.attribute("deepImageState");
-        match attribute.map(|attribute| &attribute.value[..]) {
-            Some([1]) => DeepImageState::Sorted,
-            Some([2]) => DeepImageState::NonOverlapping,
-            Some([3]) => DeepImageState::Tidy,
-            _ => DeepImageState::Messy,
-        }
-    }
-
-    /// Promises something of the samples.
-    pub fn set_state(&mut self, state: DeepImageState) {
-        let code = match state {
-            DeepImageState::Messy => 0,
-            DeepImageState::Sorted => 1,
-            DeepImageState::NonOverlapping => 2,
-            DeepImageState::Tidy => 3,
-        };
-        self.set_attribute(Attribute::new(
-            "deepImageState",
-            "deepImageState",
-            vec![code],
-        ));
     }
 
     /// The names of ids, packed as OpenEXR packs them (type `idmanifest`).

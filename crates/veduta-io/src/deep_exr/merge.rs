@@ -1,9 +1,9 @@
 //! Several deep pictures of one frame -> one that holds the samples of all, tidy.
 
+use super::DeepHeader;
 use super::header::Channel;
 use super::image::{DeepImage, DeepPixels, SampleType, Samples, Window};
 use super::tidy::{PixelSamples, Roles, Tidier};
-use super::{DeepHeader, DeepImageState};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -106,7 +106,6 @@ fn merged_header(images: &[&DeepImage]) -> Result<DeepHeader, MergeError> {
             .attributes
             .retain(|own| other.attribute(&own.name) == Some(own));
     }
-    header.set_state(DeepImageState::Tidy);
     Ok(header)
 }
 

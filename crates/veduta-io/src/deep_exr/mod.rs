@@ -21,6 +21,7 @@ mod error;
 mod flatten;
 mod guest;
 mod header;
+mod id_names;
 mod image;
 mod manifest;
 mod merge;
@@ -32,7 +33,8 @@ mod write;
 
 pub use camera::{camera_from_matrices, matrices_of_camera};
 pub use error::{DeepError, DeepPlace, DeepProblem};
-pub use header::{Attribute, Channel, DeepCompression, DeepHeader, DeepImageState};
+pub use header::{Attribute, Channel, DeepCompression, DeepHeader};
+pub use id_names::IdNames;
 pub use image::{DeepImage, DeepPixels, SampleType, Samples, Window};
 pub use manifest::{ObjectIds, murmur3_32};
 pub use merge::{MergeError, merge};

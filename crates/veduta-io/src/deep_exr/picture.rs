@@ -1,7 +1,7 @@
 //! What the pipeline makes of a scene -> a deep file.
 
 use super::image::{DeepPixels, SampleType, Samples as Column};
-use super::{Channel, DeepCompression, DeepHeader, DeepImageState, DeepWriter, ObjectIds};
+use super::{Channel, DeepCompression, DeepHeader, DeepWriter, ObjectIds};
 use crate::write::{PartialFile, is_stream};
 use crate::{Samples, WriteError, WriteProblem};
 use std::io::{Cursor, Seek, Write};
@@ -130,7 +130,7 @@ fn header(picture: &DeepPicture, color: SampleType) -> DeepHeader {
         channels.map(channel).to_vec(),
     );
     header.compression = picture.compression;
-    header.set_state(DeepImageState::Tidy);
+    // Not told: deepImageState, though samples are tidy. OpenEXR's own Python module refuses files that have it.
     header.set_camera(&picture.camera);
     header.set_attribute(picture.objects.attribute());
     let software = super::Attribute::new("software", "string", b"veduta".to_vec());

@@ -145,6 +145,9 @@ fn apply(change: &MaterialChange, material: &mut Material) {
 
 fn no_match(text: &str, materials: &[Material]) -> String {
     let names = || materials.iter().map(|material| material.name.as_str());
+    if materials.is_empty() {
+        return format!("no material is called {text:?}; there is none");
+    }
     let help = match closest(text, names()) {
         Some(name) => format!("did you mean {name:?}?"),
         None => {

@@ -6,6 +6,7 @@
 //! first. The manifest in the header tells the names.
 
 use super::Channel;
+use crate::deep_exr::murmur3_32;
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::meta::header::LayerAttributes;
 use std::collections::BTreeMap;
@@ -119,29 +120,6 @@ fn id_of(name: &str) -> f32 {
         _ => 0,
     };
     f32::from_bits(hash ^ flip)
-}
-
-/// MurmurHash3_x86_32 by Austin Appleby, with seed 0.
-fn murmur3_32(bytes: &[u8]) -> u32 {
-    let scramble = |word: u32| {
-        word.wrapping_mul(0xcc9e_2d51)
-            .rotate_left(15)
-            .wrapping_mul(0x1b87_3593)
-    };
-    let (words, rest) = bytes.as_chunks::<4>();
-    let mut hash = words.iter().fold(0u32, |hash, word| {
-        (hash ^ scramble(u32::from_le_bytes(*word)))
-            .rotate_left(13)
-            .wrapping_mul(5)
-            .wrapping_add(0xe654_6b64)
-    });
-    let mut last = [0; 4];
-    last[..rest.len()].copy_from_slice(rest);
-    hash ^= scramble(u32::from_le_bytes(last));
-    hash ^= bytes.len() as u32;
-    hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
-    hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
-    hash ^ hash >> 16
 }
 
 /// Appends a string of JSON, in ASCII.
