@@ -174,7 +174,8 @@ impl Job {
     }
 
     /// Our picture by a profile, planes of R, G and B in `own.f32`, and CPU seconds of all threads as JSON: `map`, finding
-    /// where pixels lie; `prepare`, from faces in 8 bits to planes with aprons; `filter`, to a picture in 8 bits.
+    /// where pixels lie; `first` and `prepare`, from faces in 8 bits to texels with aprons for the first and for further
+    /// frames; `filter`, to a picture in 8 bits. `wall` is the time that `filter` took by the clock.
     ///
     /// # Errors
     /// A sentence about a profile that is none or a file that cannot be written.
@@ -198,13 +199,16 @@ impl Job {
             let start = ProcessTime::now();
             let reprojection = Reprojection::new(&sources, &target, &ewa);
             let map = start.elapsed().as_secs_f64();
-            let (mut views, needs) = (reprojection.views(true), reprojection.needs());
-            let (mut prepare, mut filter, mut wall) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+            let (mut views, needs) = (reprojection.views(), reprojection.needs());
+            let (mut first, mut prepare) = (None, f64::INFINITY);
+            let (mut filter, mut wall) = (f64::INFINITY, f64::INFINITY);
             for _ in 0..4 {
                 let start = ProcessTime::now();
                 fill(&mut views, &faces, &needs);
                 views.complete();
-                prepare = start.elapsed().as_secs_f64().min(prepare);
+                let time = start.elapsed().as_secs_f64();
+                prepare = time.min(prepare);
+                first.get_or_insert(time);
                 let (start, begin) = (ProcessTime::now(), std::time::Instant::now());
                 let mut bytes = vec![[0_u8; 3]; (self.width * self.width) as usize];
                 bytes
@@ -213,18 +217,18 @@ impl Job {
                     .for_each(|(band, bytes)| {
                         let mut pixels = vec![[0.0; 4]; bytes.len()];
                         reprojection.band(&views, band, &mut pixels);
-                        for (byte, pixel) in bytes.iter_mut().zip(&pixels) {
-                            for (byte, value) in byte.iter_mut().zip(pixel) {
-                                *byte = (255.0 * value + 0.5) as u8;
-                            }
+                        for (bytes, pixel) in bytes.iter_mut().zip(pixels) {
+                            *bytes = eight_bits(pixel);
                         }
                     });
                 filter = start.elapsed().as_secs_f64().min(filter);
                 wall = begin.elapsed().as_secs_f64().min(wall);
             }
-            (reprojection.picture(&views), [map, prepare, filter, wall])
+            let first = first.unwrap_or_default();
+            let times = [map, first, prepare, filter, wall];
+            (reprojection.picture(&views), times)
         };
-        let (picture, [map, prepare, filter, wall]) = if threads == 1 {
+        let (picture, [map, first, prepare, filter, wall]) = if threads == 1 {
             on_one_thread(work)
         } else {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -232,7 +236,7 @@ impl Job {
         };
         save(folder, "own.f32", &planes(&picture))?;
         Ok(format!(
-            "{{\"map\": {map:.4}, \"prepare\": {prepare:.4}, \"filter\": {filter:.4}, \"wall\": {wall:.4}}}"
+            "{{\"map\": {map:.4}, \"first\": {first:.4}, \"prepare\": {prepare:.4}, \"filter\": {filter:.4}, \"wall\": {wall:.4}}}"
         ))
     }
 
@@ -319,29 +323,32 @@ fn mean(samples: u32, value: impl Fn(DVec2) -> [f64; 3]) -> [f64; 3] {
     sum
 }
 
-/// From planes of 8 bits to those of views, but for views of which nothing is needed.
+/// From planes of 8 bits to the texels of views, as far as they are needed.
 fn fill(views: &mut Views, faces: &[[Vec<u8>; 3]], needs: &[Need]) {
-    for (index, face) in faces.iter().enumerate() {
-        if needs[index].window.is_none() {
+    for (index, [r, g, b]) in faces.iter().enumerate() {
+        let Some([left, top, right, bottom]) = needs[index].window else {
             continue;
-        }
-        let planes = views.planes_mut(index);
-        let (width, height) = (planes.width() as usize, planes.height() as usize);
-        for mut row in planes.rows_mut() {
-            let Some(number) = usize::try_from(row.number())
-                .ok()
-                .filter(|&row| row < height)
-            else {
-                continue;
-            };
-            for (channel, texels) in face.iter().enumerate() {
-                let texels = &texels[number * width..(number + 1) * width];
-                for (sample, texel) in row.channel(channel).iter_mut().zip(texels) {
-                    *sample = f32::from(*texel) * (1.0 / 255.0);
-                }
+        };
+        let width = views.projections()[index].width as usize;
+        for row in top..bottom {
+            let start = row as usize * width;
+            let all = start + left as usize..start + right as usize;
+            let texels = &mut views.row_mut(index, row)[left as usize..right as usize];
+            let bytes = r[all.clone()].iter().zip(&g[all.clone()]).zip(&b[all]);
+            for (texel, ((&r, &g), &b)) in texels.iter_mut().zip(bytes) {
+                let [r, g, b] = [r, g, b].map(|byte| f32::from(byte) * (1.0 / 255.0));
+                *texel = [r, g, b, 1.0];
             }
         }
     }
+}
+
+/// From a pixel to 8 bits.
+fn eight_bits(pixel: [f32; 4]) -> [u8; 3] {
+    // Added to this, a number is rounded to a whole one, in the last bits; in vectors, unlike `as u8`.
+    const WHOLE: f32 = 8_388_608.0;
+    let [r, g, b, _] = pixel.map(|x| (255.0 * x.clamp(0.0, 1.0) + WHOLE).to_bits() as u8);
+    [r, g, b]
 }
 
 /// Planes of R, G and B of a picture, as bytes.

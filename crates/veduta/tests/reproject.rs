@@ -394,7 +394,7 @@ fn what_no_view_shows_is_transparent_and_told() {
     let missing = reprojection.missing();
     let names: Vec<&str> = missing.toward.iter().map(|(name, _)| *name).collect();
     assert_eq!(names, ["down", "back"]);
-    let mut views = reprojection.views(true);
+    let mut views = reprojection.views();
     for (index, source) in paper.iter().enumerate() {
         views.set(index, &rendered(source, &smooth, 1));
     }
@@ -464,7 +464,7 @@ fn bytes_do_not_depend_on_threads_and_a_sequence_is_its_frames() {
     let [one, two] = [1, 2].map(alone);
     assert!(one == two);
     let reprojection = Reprojection::new(&sources, &target, &Ewa::default());
-    let mut planes = reprojection.views(true);
+    let mut planes = reprojection.views();
     for frame in [&first, &second] {
         for (index, (_, picture)) in frame.iter().enumerate() {
             planes.set(index, picture);

@@ -121,11 +121,8 @@ impl Reprojection {
 
     /// Black views with room for what this picture needs of them: to be set, completed, and given to
     /// [`picture`](Self::picture).
-    ///
-    /// `opaque` views have no channel of opacity, which saves a quarter of memory and time.
-    pub fn views(&self, opaque: bool) -> Views {
-        let channels = if opaque { 3 } else { 4 };
-        Views::new(&self.sources, channels, self.apron(), self.levels())
+    pub fn views(&self) -> Views {
+        Views::new(&self.sources, self.apron(), self.levels())
     }
 
     /// The picture: RGBA in linear light, colour premultiplied by opacity, which is 0 where no view shows anything and the
@@ -170,23 +167,13 @@ impl Reprojection {
             "a band's pixels"
         );
         let (ewa, width, band) = (&self.ewa, self.target.width, &self.bands[band]);
-        if views.channels() == 3 {
-            vectorized(Filtering::<3> {
-                ewa,
-                views,
-                band,
-                width,
-                pixels,
-            });
-        } else {
-            vectorized(Filtering::<4> {
-                ewa,
-                views,
-                band,
-                width,
-                pixels,
-            });
-        }
+        vectorized(Filtering {
+            ewa,
+            views,
+            band,
+            width,
+            pixels,
+        });
     }
 
     fn apron(&self) -> u32 {
@@ -227,13 +214,12 @@ pub fn reproject(
 ) -> (Picture, Missing) {
     let sources: Vec<Projection> = views.iter().map(|(projection, _)| *projection).collect();
     let reprojection = Reprojection::new(&sources, target, ewa);
-    let opaque = views.iter().all(|(_, picture)| picture.is_opaque());
-    let mut planes = reprojection.views(opaque);
+    let mut texels = reprojection.views();
     for (index, (_, picture)) in views.iter().enumerate() {
-        planes.set(index, picture);
+        texels.set(index, picture);
     }
-    planes.complete();
-    (reprojection.picture(&planes), reprojection.missing())
+    texels.complete();
+    (reprojection.picture(&texels), reprojection.missing())
 }
 
 impl Found {

@@ -110,19 +110,17 @@ impl Geometry {
 
     /// Makes the pictures of a frame from those of its views.
     pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
-        let opaque = views.iter().all(Picture::is_opaque);
         let is_alone = self.parts.len() == 1;
         let make = |part: &mut Part| {
-            let channels = if opaque { 3 } else { 4 };
-            let kept = part.views.take().filter(|kept| kept.channels() == channels);
-            let mut planes = kept.unwrap_or_else(|| part.reprojection.views(opaque));
+            let kept = part.views.take();
+            let mut texels = kept.unwrap_or_else(|| part.reprojection.views());
             for (view, picture) in views.iter().enumerate() {
-                planes.set(view, picture);
+                texels.set(view, picture);
             }
-            planes.complete();
-            let picture = part.reprojection.picture(&planes);
+            texels.complete();
+            let picture = part.reprojection.picture(&texels);
             // The room of six sides at once would be too much.
-            part.views = is_alone.then_some(planes);
+            part.views = is_alone.then_some(texels);
             picture
         };
         self.parts.iter_mut().map(make).collect()
