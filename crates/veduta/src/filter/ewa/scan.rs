@@ -1,7 +1,7 @@
+use super::Ewa;
 use super::footprint::Footprints;
 use super::lanes::{LANES, Vector};
 use super::profile::{Gaussian, Mixture, Round, Weigh};
-use super::Ewa;
 use crate::filter::{PADDING, Texels};
 
 /// What rounding may add to a mean of a hundred texels, relative; a mean nearer than this to the texel in its middle is
