@@ -122,7 +122,23 @@ impl Reprojection {
     /// Black views with room for what this picture needs of them: to be set, completed, and given to
     /// [`picture`](Self::picture).
     pub fn views(&self) -> Views {
-        Views::new(&self.sources, self.apron(), self.levels())
+        Self::views_of(std::slice::from_ref(self))
+    }
+
+    /// The same with room for several pictures of the same views, such as the sides of a cube.
+    ///
+    /// # Panics
+    /// If there is no picture, or they are of other views.
+    pub fn views_of(pictures: &[Self]) -> Views {
+        let sources = &pictures.first().expect("a picture").sources;
+        let are_of_them = |picture: &Self| picture.sources == *sources;
+        assert!(
+            pictures.iter().all(are_of_them),
+            "pictures of the same views"
+        );
+        let apron = pictures.iter().map(Self::apron).max();
+        let levels = pictures.iter().map(Self::levels).max();
+        Views::new(sources, apron.unwrap_or(LEAST_APRON), levels.unwrap_or(1))
     }
 
     /// The picture: RGBA in linear light, colour premultiplied by opacity, which is 0 where no view shows anything and the
