@@ -1,6 +1,7 @@
 //! A fulldome picture from cube faces: files for other programs, our own times and errors.
 
 use crate::timing::on_one_thread;
+use crate::two_pass::{Face, TwoPass};
 use cpu_time::ProcessTime;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -83,12 +84,12 @@ impl Job {
     }
 
     /// The faces in 8 bits, texels one after the other, face by face.
-    fn texels(&self) -> Vec<Vec<[u8; 3]>> {
+    fn texels(&self, faces: &[Projection]) -> Vec<Vec<[u8; 3]>> {
         let frequency = self.frequency();
         let face = |projection: &Projection| {
-            let count = self.faces as usize * self.faces as usize;
+            let count = projection.width as usize * projection.height as usize;
             let texel = |index: usize| {
-                let corner = corner(index, self.faces);
+                let corner = corner(index, projection.width);
                 mean(SAMPLES, |at| {
                     pattern(
                         projection.direction(corner + at).expect("a face"),
@@ -99,7 +100,7 @@ impl Job {
             };
             (0..count).into_par_iter().map(texel).collect()
         };
-        self.sources().iter().map(face).collect()
+        faces.iter().map(face).collect()
     }
 
     /// Writes into a folder: `faces.gbrp`, all faces side by side in planes of 8 bits as ffmpeg reads them; `box.f32`
@@ -109,7 +110,7 @@ impl Job {
     /// # Errors
     /// A sentence about a file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), String> {
-        let texels = self.texels();
+        let texels = self.texels(&self.sources());
         let mut planes = Vec::new();
         let side = self.faces as usize;
         for channel in [1, 2, 0] {
@@ -193,7 +194,11 @@ impl Job {
             ..Ewa::default()
         };
         let planar = |face: Vec<[u8; 3]>| [0, 1, 2].map(|k| face.iter().map(|t| t[k]).collect());
-        let faces: Vec<[Vec<u8>; 3]> = self.texels().into_iter().map(planar).collect();
+        let faces: Vec<[Vec<u8>; 3]> = self
+            .texels(&self.sources())
+            .into_iter()
+            .map(planar)
+            .collect();
         let work = || {
             let (sources, target) = (self.sources(), self.target());
             let start = ProcessTime::now();
@@ -240,10 +245,58 @@ impl Job {
         ))
     }
 
+    /// The picture in two passes ([`TwoPass`]), planes of R, G and B in `own.f32`, and as JSON CPU seconds of one thread:
+    /// `map`, finding where pixels lie; `filter`, to a picture in f32; and the `bottleneck`.
+    ///
+    /// # Errors
+    /// A sentence about a picture that is too small, or a file that cannot be written.
+    pub fn two_pass(&self, folder: &Path) -> Result<String, String> {
+        // Faces that go on beyond their edges stand for aprons.
+        const APRON: u32 = 16;
+        if self.width < 64 {
+            return Err("two passes are for pictures of 64 pixels and more".into());
+        }
+        let side = self.faces + 2 * APRON;
+        let fov = 2.0 * (f64::from(side) / f64::from(self.faces)).atan();
+        let lens = Lens::Perspective { fov };
+        let wide = |face: &Projection| Projection::new(lens, face.orientation, side, side);
+        let sources: Vec<Projection> = self.sources().iter().map(wide).collect();
+        let face = |texels: Vec<[u8; 3]>| Face {
+            side: side as usize,
+            texels: texels.into_iter().map(from_eight_bits).collect(),
+        };
+        let faces = self.texels(&sources).into_iter().map(face);
+        let faces: Vec<Face> = faces.collect();
+        let (pixels, bottleneck, [map, filter]) = on_one_thread(|| {
+            let start = ProcessTime::now();
+            let two_pass = TwoPass::new(&sources, &self.target());
+            let map = start.elapsed().as_secs_f64();
+            let mut filter = f64::INFINITY;
+            for _ in 0..4 {
+                let start = ProcessTime::now();
+                std::hint::black_box(two_pass.picture(&faces));
+                filter = start.elapsed().as_secs_f64().min(filter);
+            }
+            let pixels = two_pass.picture(&faces);
+            (pixels, two_pass.bottleneck(), [map, filter])
+        });
+        let (width, height) = (self.width, self.width);
+        let picture = Picture {
+            width,
+            height,
+            pixels,
+        };
+        save(folder, "own.f32", &planes(&picture))?;
+        Ok(format!(
+            "{{\"map\": {map:.4}, \"filter\": {filter:.4}, \"bottleneck\": {bottleneck:.2}}}"
+        ))
+    }
+
     /// CPU seconds of the filter as the paper prints it: scan of the box, table of weights, one face, derivatives by
     /// differences, faces in 8 bits.
     pub fn printed(&self) -> f64 {
-        let (sources, target, texels) = (self.sources(), self.target(), self.texels());
+        let (sources, target, texels) =
+            (self.sources(), self.target(), self.texels(&self.sources()));
         let table = WeightTable::new(|q| (-2.0 * q).exp());
         let side = self.faces as i32;
         on_one_thread(|| {
@@ -336,11 +389,16 @@ fn fill(views: &mut Views, faces: &[[Vec<u8>; 3]], needs: &[Need]) {
             let texels = &mut views.row_mut(index, row)[left as usize..right as usize];
             let bytes = r[all.clone()].iter().zip(&g[all.clone()]).zip(&b[all]);
             for (texel, ((&r, &g), &b)) in texels.iter_mut().zip(bytes) {
-                let [r, g, b] = [r, g, b].map(|byte| f32::from(byte) * (1.0 / 255.0));
-                *texel = [r, g, b, 1.0];
+                *texel = from_eight_bits([r, g, b]);
             }
         }
     }
+}
+
+/// From 8 bits to a texel.
+fn from_eight_bits(bytes: [u8; 3]) -> [f32; 4] {
+    let [r, g, b] = bytes.map(|byte| f32::from(byte) * (1.0 / 255.0));
+    [r, g, b, 1.0]
 }
 
 /// From a pixel to 8 bits.
