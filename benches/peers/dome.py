@@ -60,6 +60,10 @@ def quality(bench, faces, width, profiles):
                            stdout=subprocess.DEVNULL)
             own = np.fromfile(folder / "own.f32", np.float32).reshape(3, width, width)
             row(f"ours, {profile}", errors(own, folder, width))
+        told = subprocess.run([bench, "dome-two-pass", str(faces), str(width), name], check=True, capture_output=True,
+                              text=True).stdout
+        own = np.fromfile(folder / "own.f32", np.float32).reshape(3, width, width)
+        row(f"two passes (bottleneck {json.loads(told)['bottleneck']})", errors(own, folder, width))
         if shutil.which("ffmpeg"):
             out = folder / "v360.gbrp"
             subprocess.run(v360(faces, width, folder, ["-f", "rawvideo", str(out)]), check=True)
@@ -73,7 +77,7 @@ def row(title, found):
 
 def speed(bench, faces, width, rounds):
     print(f"\nFaces of {faces} to a dome of {width}, CPU seconds of one thread, least of {rounds} rounds in turn\n")
-    own, first, both = [], [], []
+    own, two_pass, first, both = [], [], [], []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         # Any bytes do for time; these need no rendering.
@@ -83,18 +87,24 @@ def speed(bench, faces, width, rounds):
             told = subprocess.run([bench, "dome-own", str(faces), str(width), "auto", "1", name], check=True,
                                   capture_output=True, text=True).stdout
             own.append(json.loads(told))
+            told = subprocess.run([bench, "dome-two-pass", str(faces), str(width), name], check=True,
+                                  capture_output=True, text=True).stdout
+            two_pass.append(json.loads(told))
             if shutil.which("ffmpeg"):
                 null = ["-f", "null", "-"]
                 first.append(cpu_seconds(v360(faces, width, folder, null)))
                 both.append(cpu_seconds(v360(faces, width, folder, null, loops=4)))
     best = {key: min(times[key] for times in own) for key in own[0]}
     frame = best["prepare"] + best["filter"]
-    print(f"ours: map {best['map']:.2f}, planes and aprons {best['prepare']:.2f}, filter {best['filter']:.2f}; "
-          f"first frame {best['map'] + frame:.2f}, further {frame:.2f}")
+    first_frame = best["map"] + best["first"] + best["filter"]
+    print(f"ours: map {best['map']:.2f}, texels and aprons {best['first']:.2f} and {best['prepare']:.2f}, "
+          f"filter {best['filter']:.2f}; first frame {first_frame:.2f}, further {frame:.2f}")
+    map_time, filter_time = (min(times[key] for times in two_pass) for key in ["map", "filter"])
+    print(f"two passes: map {map_time:.2f}, filter {filter_time:.2f}")
     if first:
         further = (min(both) - min(first)) / 4
         print(f"v360 lanczos, reading raw faces included: first frame {min(first):.2f}, further {further:.2f}; ours take "
-              f"{(best['map'] + frame) / min(first):.2f} and {frame / further:.2f} of it")
+              f"{first_frame / min(first):.2f} and {frame / further:.2f} of it")
     printed = float(subprocess.run([bench, "dome-printed", str(faces), str(width)], check=True, capture_output=True,
                                    text=True).stdout)
     print(f"the scan as printed: {printed:.2f}; ours is {printed / best['filter']:.1f} times as fast")

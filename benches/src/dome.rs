@@ -1,6 +1,7 @@
 //! A fulldome picture from cube faces: files for other programs, our own times and errors.
 
 use crate::timing::on_one_thread;
+use crate::two_pass::{Face, TwoPass};
 use cpu_time::ProcessTime;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -83,12 +84,12 @@ impl Job {
     }
 
     /// The faces in 8 bits, texels one after the other, face by face.
-    fn texels(&self) -> Vec<Vec<[u8; 3]>> {
+    fn texels(&self, faces: &[Projection]) -> Vec<Vec<[u8; 3]>> {
         let frequency = self.frequency();
         let face = |projection: &Projection| {
-            let count = self.faces as usize * self.faces as usize;
+            let count = projection.width as usize * projection.height as usize;
             let texel = |index: usize| {
-                let corner = corner(index, self.faces);
+                let corner = corner(index, projection.width);
                 mean(SAMPLES, |at| {
                     pattern(
                         projection.direction(corner + at).expect("a face"),
@@ -99,7 +100,7 @@ impl Job {
             };
             (0..count).into_par_iter().map(texel).collect()
         };
-        self.sources().iter().map(face).collect()
+        faces.iter().map(face).collect()
     }
 
     /// Writes into a folder: `faces.gbrp`, all faces side by side in planes of 8 bits as ffmpeg reads them; `box.f32`
@@ -109,7 +110,7 @@ impl Job {
     /// # Errors
     /// A sentence about a file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), String> {
-        let texels = self.texels();
+        let texels = self.texels(&self.sources());
         let mut planes = Vec::new();
         let side = self.faces as usize;
         for channel in [1, 2, 0] {
@@ -174,7 +175,8 @@ impl Job {
     }
 
     /// Our picture by a profile, planes of R, G and B in `own.f32`, and CPU seconds of all threads as JSON: `map`, finding
-    /// where pixels lie; `prepare`, from faces in 8 bits to planes with aprons; `filter`, to a picture in 8 bits.
+    /// where pixels lie; `first` and `prepare`, from faces in 8 bits to texels with aprons for the first and for further
+    /// frames; `filter`, to a picture in 8 bits. `wall` is the time that `filter` took by the clock.
     ///
     /// # Errors
     /// A sentence about a profile that is none or a file that cannot be written.
@@ -192,19 +194,26 @@ impl Job {
             ..Ewa::default()
         };
         let planar = |face: Vec<[u8; 3]>| [0, 1, 2].map(|k| face.iter().map(|t| t[k]).collect());
-        let faces: Vec<[Vec<u8>; 3]> = self.texels().into_iter().map(planar).collect();
+        let faces: Vec<[Vec<u8>; 3]> = self
+            .texels(&self.sources())
+            .into_iter()
+            .map(planar)
+            .collect();
         let work = || {
             let (sources, target) = (self.sources(), self.target());
             let start = ProcessTime::now();
             let reprojection = Reprojection::new(&sources, &target, &ewa);
             let map = start.elapsed().as_secs_f64();
-            let (mut views, needs) = (reprojection.views(true), reprojection.needs());
-            let (mut prepare, mut filter, mut wall) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+            let (mut views, needs) = (reprojection.views(), reprojection.needs());
+            let (mut first, mut prepare) = (None, f64::INFINITY);
+            let (mut filter, mut wall) = (f64::INFINITY, f64::INFINITY);
             for _ in 0..4 {
                 let start = ProcessTime::now();
                 fill(&mut views, &faces, &needs);
                 views.complete();
-                prepare = start.elapsed().as_secs_f64().min(prepare);
+                let time = start.elapsed().as_secs_f64();
+                prepare = time.min(prepare);
+                first.get_or_insert(time);
                 let (start, begin) = (ProcessTime::now(), std::time::Instant::now());
                 let mut bytes = vec![[0_u8; 3]; (self.width * self.width) as usize];
                 bytes
@@ -213,18 +222,18 @@ impl Job {
                     .for_each(|(band, bytes)| {
                         let mut pixels = vec![[0.0; 4]; bytes.len()];
                         reprojection.band(&views, band, &mut pixels);
-                        for (byte, pixel) in bytes.iter_mut().zip(&pixels) {
-                            for (byte, value) in byte.iter_mut().zip(pixel) {
-                                *byte = (255.0 * value + 0.5) as u8;
-                            }
+                        for (bytes, pixel) in bytes.iter_mut().zip(pixels) {
+                            *bytes = eight_bits(pixel);
                         }
                     });
                 filter = start.elapsed().as_secs_f64().min(filter);
                 wall = begin.elapsed().as_secs_f64().min(wall);
             }
-            (reprojection.picture(&views), [map, prepare, filter, wall])
+            let first = first.unwrap_or_default();
+            let times = [map, first, prepare, filter, wall];
+            (reprojection.picture(&views), times)
         };
-        let (picture, [map, prepare, filter, wall]) = if threads == 1 {
+        let (picture, [map, first, prepare, filter, wall]) = if threads == 1 {
             on_one_thread(work)
         } else {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -232,14 +241,62 @@ impl Job {
         };
         save(folder, "own.f32", &planes(&picture))?;
         Ok(format!(
-            "{{\"map\": {map:.4}, \"prepare\": {prepare:.4}, \"filter\": {filter:.4}, \"wall\": {wall:.4}}}"
+            "{{\"map\": {map:.4}, \"first\": {first:.4}, \"prepare\": {prepare:.4}, \"filter\": {filter:.4}, \"wall\": {wall:.4}}}"
+        ))
+    }
+
+    /// The picture in two passes ([`TwoPass`]), planes of R, G and B in `own.f32`, and as JSON CPU seconds of one thread:
+    /// `map`, finding where pixels lie; `filter`, to a picture in f32; and the `bottleneck`.
+    ///
+    /// # Errors
+    /// A sentence about a picture that is too small, or a file that cannot be written.
+    pub fn two_pass(&self, folder: &Path) -> Result<String, String> {
+        // Faces that go on beyond their edges stand for aprons.
+        const APRON: u32 = 16;
+        if self.width < 64 {
+            return Err("two passes are for pictures of 64 pixels and more".into());
+        }
+        let side = self.faces + 2 * APRON;
+        let fov = 2.0 * (f64::from(side) / f64::from(self.faces)).atan();
+        let lens = Lens::Perspective { fov };
+        let wide = |face: &Projection| Projection::new(lens, face.orientation, side, side);
+        let sources: Vec<Projection> = self.sources().iter().map(wide).collect();
+        let face = |texels: Vec<[u8; 3]>| Face {
+            side: side as usize,
+            texels: texels.into_iter().map(from_eight_bits).collect(),
+        };
+        let faces = self.texels(&sources).into_iter().map(face);
+        let faces: Vec<Face> = faces.collect();
+        let (pixels, bottleneck, [map, filter]) = on_one_thread(|| {
+            let start = ProcessTime::now();
+            let two_pass = TwoPass::new(&sources, &self.target());
+            let map = start.elapsed().as_secs_f64();
+            let mut filter = f64::INFINITY;
+            for _ in 0..4 {
+                let start = ProcessTime::now();
+                std::hint::black_box(two_pass.picture(&faces));
+                filter = start.elapsed().as_secs_f64().min(filter);
+            }
+            let pixels = two_pass.picture(&faces);
+            (pixels, two_pass.bottleneck(), [map, filter])
+        });
+        let (width, height) = (self.width, self.width);
+        let picture = Picture {
+            width,
+            height,
+            pixels,
+        };
+        save(folder, "own.f32", &planes(&picture))?;
+        Ok(format!(
+            "{{\"map\": {map:.4}, \"filter\": {filter:.4}, \"bottleneck\": {bottleneck:.2}}}"
         ))
     }
 
     /// CPU seconds of the filter as the paper prints it: scan of the box, table of weights, one face, derivatives by
     /// differences, faces in 8 bits.
     pub fn printed(&self) -> f64 {
-        let (sources, target, texels) = (self.sources(), self.target(), self.texels());
+        let (sources, target, texels) =
+            (self.sources(), self.target(), self.texels(&self.sources()));
         let table = WeightTable::new(|q| (-2.0 * q).exp());
         let side = self.faces as i32;
         on_one_thread(|| {
@@ -319,29 +376,37 @@ fn mean(samples: u32, value: impl Fn(DVec2) -> [f64; 3]) -> [f64; 3] {
     sum
 }
 
-/// From planes of 8 bits to those of views, but for views of which nothing is needed.
+/// From planes of 8 bits to the texels of views, as far as they are needed.
 fn fill(views: &mut Views, faces: &[[Vec<u8>; 3]], needs: &[Need]) {
-    for (index, face) in faces.iter().enumerate() {
-        if needs[index].window.is_none() {
+    for (index, [r, g, b]) in faces.iter().enumerate() {
+        let Some([left, top, right, bottom]) = needs[index].window else {
             continue;
-        }
-        let planes = views.planes_mut(index);
-        let (width, height) = (planes.width() as usize, planes.height() as usize);
-        for mut row in planes.rows_mut() {
-            let Some(number) = usize::try_from(row.number())
-                .ok()
-                .filter(|&row| row < height)
-            else {
-                continue;
-            };
-            for (channel, texels) in face.iter().enumerate() {
-                let texels = &texels[number * width..(number + 1) * width];
-                for (sample, texel) in row.channel(channel).iter_mut().zip(texels) {
-                    *sample = f32::from(*texel) * (1.0 / 255.0);
-                }
+        };
+        let width = views.projections()[index].width as usize;
+        for row in top..bottom {
+            let start = row as usize * width;
+            let all = start + left as usize..start + right as usize;
+            let texels = &mut views.row_mut(index, row)[left as usize..right as usize];
+            let bytes = r[all.clone()].iter().zip(&g[all.clone()]).zip(&b[all]);
+            for (texel, ((&r, &g), &b)) in texels.iter_mut().zip(bytes) {
+                *texel = from_eight_bits([r, g, b]);
             }
         }
     }
+}
+
+/// From 8 bits to a texel.
+fn from_eight_bits(bytes: [u8; 3]) -> [f32; 4] {
+    let [r, g, b] = bytes.map(|byte| f32::from(byte) * (1.0 / 255.0));
+    [r, g, b, 1.0]
+}
+
+/// From a pixel to 8 bits.
+fn eight_bits(pixel: [f32; 4]) -> [u8; 3] {
+    // Added to this, a number is rounded to a whole one, in the last bits; in vectors, unlike `as u8`.
+    const WHOLE: f32 = 8_388_608.0;
+    let [r, g, b, _] = pixel.map(|x| (255.0 * x.clamp(0.0, 1.0) + WHOLE).to_bits() as u8);
+    [r, g, b]
 }
 
 /// Planes of R, G and B of a picture, as bytes.

@@ -14,4 +14,5 @@ pub mod glb;
 pub mod peers;
 pub mod table;
 pub mod timing;
+pub mod two_pass;
 pub mod zbuffer;

@@ -30,6 +30,7 @@ Usage: veduta-bench TABLE [SCENE[@WIDTHxHEIGHT]...]
        veduta-bench dome-files FACES WIDTH FOLDER
        veduta-bench dome-own FACES WIDTH PROFILE THREADS FOLDER
        veduta-bench dome-printed FACES WIDTH
+       veduta-bench dome-two-pass FACES WIDTH FOLDER
 
 Tables:
   n-et      multiscan with n sub-scanlines, the slope and intercept of its time over n, and
@@ -53,7 +54,8 @@ For benches/peers:
   difference  how many pixels of a picture are off, as JSON
   dome-files  faces of a cube with zone plates, and their exact picture in a dome
   dome-own   our CPU seconds to that picture by a profile of the elliptical filter, as JSON
-  dome-printed  CPU seconds of the filter as Greene & Heckbert print it";
+  dome-printed  CPU seconds of the filter as Greene & Heckbert print it
+  dome-two-pass  the same picture in two passes of one dimension, and its CPU seconds, as JSON";
 
 /// Rounds of measuring, for scenes that do not take long.
 const ROUNDS: u32 = 5;
@@ -220,6 +222,9 @@ fn main() -> ExitCode {
         ("dome-printed", [faces, width]) => {
             Job::parse(faces, width).map(|job| println!("{:.3}", job.printed()))
         }
+        ("dome-two-pass", [faces, width, folder]) => Job::parse(faces, width)
+            .and_then(|job| job.two_pass(Path::new(folder)))
+            .map(|times| println!("{times}")),
         _ => print_table(name, scenes),
     };
     match done {

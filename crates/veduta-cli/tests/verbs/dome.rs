@@ -543,3 +543,15 @@ fn a_tilted_dome_looks_lower_and_any_number_of_threads_gives_the_same() {
     let piped = folder.told_bytes("dome --test-card 32 --tilt 20deg -o - --size 48");
     assert_eq!(piped, folder.read("tilted.png"));
 }
+
+#[test]
+fn a_cube_in_one_picture_goes_to_stdout_and_six_files_do_not() {
+    let folder = Folder::new();
+    folder.told("dome --test-card 16 --lens cube --to-layout 3x2 -o strip.png");
+    let streamed = folder.told_bytes("dome --test-card 16 --lens cube --to-layout 3x2 -o -");
+    assert!(streamed == folder.read("strip.png"));
+    folder
+        .veduta("dome --test-card 16 --lens cube -o -")
+        .assert()
+        .code(2);
+}

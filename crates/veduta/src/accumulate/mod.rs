@@ -31,13 +31,6 @@ pub struct Picture {
     pub pixels: Vec<[f32; 4]>,
 }
 
-impl Picture {
-    /// Whether nothing is seen through any pixel.
-    pub fn is_opaque(&self) -> bool {
-        self.pixels.iter().all(|pixel| pixel[3] == 1.0)
-    }
-}
-
 /// Sums a band's parts into `pixels`, the band's rows, which are overwritten. `sums` is a buffer.
 ///
 /// Sums are f64: a pixel may have thousands of parts (foliage, distant terrain), and the rounding of

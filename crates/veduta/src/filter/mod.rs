@@ -15,17 +15,18 @@
 //!     .-------.-------.-------.
 //! ```
 //!
-//! Textures and views are filtered the other way round, from pixels to texels: [`ewa`], on [`Planes`].
+//! Textures and views are filtered the other way round, from pixels to texels: [`ewa`], on [`Texels`].
 //!
 //! Kernels sum to 1 over all pixels at any point ([`Kernel`]): no point of the scene counts more than another,
 //! however it lies to the pixels, and what a picture sums up to does not depend on the filter.
 
 pub mod ewa;
 mod kernel;
-mod planes;
+mod texels;
 
 pub use kernel::{CellKernel, Kernel};
-pub use planes::{Planes, RowMut, Wrap};
+pub(crate) use texels::PADDING;
+pub use texels::{Texels, Wrap};
 
 /// A pixel filter.
 ///

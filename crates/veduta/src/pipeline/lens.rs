@@ -191,7 +191,7 @@ pub fn render_filtered(
     let needs = reprojection.needs();
     let needed = |index: &usize| needs[*index].window.is_some();
     let needed: Vec<usize> = (0..views.len()).filter(needed).collect();
-    let mut planes = reprojection.views(false);
+    let mut texels = reprojection.views();
     let settings = RenderSettings {
         width: side,
         height: side,
@@ -202,12 +202,12 @@ pub fn render_filtered(
         let count = needed.len();
         begin(Step::View { index, count });
         let picture = render(scene, &views[face].camera, &settings, |_| {}).picture;
-        planes.set(face, &picture);
+        texels.set(face, &picture);
     }
     begin(Step::Shading);
-    planes.complete();
+    texels.complete();
     let faces = needed.into_iter().map(|face| views[face].face);
-    (reprojection.picture(&planes), faces.collect())
+    (reprojection.picture(&texels), faces.collect())
 }
 
 /// All of each face of the cube around `eye`.

@@ -34,14 +34,18 @@ impl Mapping<'_> {
         Some(self.placed(view, at, &ray))
     }
 
-    /// Image points of a view are continuous but where it closes around; there, the one nearest to `near`.
+    /// Where an image point lies in a view, as texel; of those a full turn apart, the nearest to `near`.
     pub fn texel_near(&self, view: usize, image: DVec2, near: DVec2) -> Option<DVec2> {
-        let source = &self.sources[view];
-        let mut at = source.image(self.target.direction(image)?)? - 0.5;
-        if let Some(period) = source.period() {
-            at.x -= ((at.x - near.x) / period).round() * period;
+        let at = self.sources[view].image(self.target.direction(image)?)? - 0.5;
+        Some(self.nearest(view, at, near))
+    }
+
+    /// Texels of a view are continuous but where it closes around; of those that are one, the nearest to `near`.
+    pub fn nearest(&self, view: usize, mut texel: DVec2, near: DVec2) -> DVec2 {
+        if let Some(period) = self.sources[view].period() {
+            texel.x -= ((texel.x - near.x) / period).round() * period;
         }
-        Some(at)
+        texel
     }
 
     fn placed(&self, view: usize, at: DVec2, ray: &Ray) -> Place {

@@ -6,18 +6,22 @@
 //! 1. `lens`, `orientation`, `projection`: which direction is seen where; `names` of lenses;
 //! 2. `mapping`, `tiles`: where each pixel lies in which view, as polynomials in tiles of the picture
 //!    ([`Reprojection`]);
-//! 3. `views`: the views' pictures, continued beyond their borders by their neighbours ([`Views`]);
+//! 3. `views`, `aprons`: the views' pictures, continued beyond their borders by their neighbours ([`Views`]);
 //! 4. `run`: the filter, eight pixels at once.
 //!
 //! Steps 1 and 2 do not look at pictures, so that what is needed of which view is known before any is read, and further
 //! frames of a sequence need steps 3 and 4 only. The filter is that of Greene & Heckbert (1986), in
 //! [`filter::ewa`](crate::filter::ewa).
 
+mod aprons;
 mod lens;
 mod mapping;
 mod names;
 mod orientation;
+mod parts;
 pub mod patches;
+mod pixels;
+mod polynomial;
 mod projection;
 mod reprojection;
 mod run;

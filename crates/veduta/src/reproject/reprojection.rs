@@ -121,11 +121,24 @@ impl Reprojection {
 
     /// Black views with room for what this picture needs of them: to be set, completed, and given to
     /// [`picture`](Self::picture).
+    pub fn views(&self) -> Views {
+        Self::views_of(std::slice::from_ref(self))
+    }
+
+    /// The same with room for several pictures of the same views, such as the sides of a cube.
     ///
-    /// `opaque` views have no channel of opacity, which saves a quarter of memory and time.
-    pub fn views(&self, opaque: bool) -> Views {
-        let channels = if opaque { 3 } else { 4 };
-        Views::new(&self.sources, channels, self.apron(), self.levels())
+    /// # Panics
+    /// If there is no picture, or they are of other views.
+    pub fn views_of(pictures: &[Self]) -> Views {
+        let sources = &pictures.first().expect("a picture").sources;
+        let are_of_them = |picture: &Self| picture.sources == *sources;
+        assert!(
+            pictures.iter().all(are_of_them),
+            "pictures of the same views"
+        );
+        let apron = pictures.iter().map(Self::apron).max();
+        let levels = pictures.iter().map(Self::levels).max();
+        Views::new(sources, apron.unwrap_or(LEAST_APRON), levels.unwrap_or(1))
     }
 
     /// The picture: RGBA in linear light, colour premultiplied by opacity, which is 0 where no view shows anything and the
@@ -170,23 +183,13 @@ impl Reprojection {
             "a band's pixels"
         );
         let (ewa, width, band) = (&self.ewa, self.target.width, &self.bands[band]);
-        if views.channels() == 3 {
-            vectorized(Filtering::<3> {
-                ewa,
-                views,
-                band,
-                width,
-                pixels,
-            });
-        } else {
-            vectorized(Filtering::<4> {
-                ewa,
-                views,
-                band,
-                width,
-                pixels,
-            });
-        }
+        vectorized(Filtering {
+            ewa,
+            views,
+            band,
+            width,
+            pixels,
+        });
     }
 
     fn apron(&self) -> u32 {
@@ -227,13 +230,12 @@ pub fn reproject(
 ) -> (Picture, Missing) {
     let sources: Vec<Projection> = views.iter().map(|(projection, _)| *projection).collect();
     let reprojection = Reprojection::new(&sources, target, ewa);
-    let opaque = views.iter().all(|(_, picture)| picture.is_opaque());
-    let mut planes = reprojection.views(opaque);
+    let mut texels = reprojection.views();
     for (index, (_, picture)) in views.iter().enumerate() {
-        planes.set(index, picture);
+        texels.set(index, picture);
     }
-    planes.complete();
-    (reprojection.picture(&planes), reprojection.missing())
+    texels.complete();
+    (reprojection.picture(&texels), reprojection.missing())
 }
 
 impl Found {

@@ -4,9 +4,9 @@ use super::Views;
 use super::tiles::{Band, Single, Tile};
 use crate::filter::ewa::{Ewa, Footprints, LANES, Vector, Work};
 
-/// Makes a band's pixels, `width` to a row, of `C` channels. To be run by
+/// Makes a band's pixels, `width` to a row. To be run by
 /// [`vectorized`](crate::filter::ewa::vectorized).
-pub(super) struct Filtering<'a, const C: usize> {
+pub(super) struct Filtering<'a> {
     pub ewa: &'a Ewa,
     pub views: &'a Views,
     pub band: &'a Band,
@@ -14,7 +14,7 @@ pub(super) struct Filtering<'a, const C: usize> {
     pub pixels: &'a mut [[f32; 4]],
 }
 
-impl<const C: usize> Work for Filtering<'_, C> {
+impl Work for Filtering<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -28,10 +28,10 @@ impl<const C: usize> Work for Filtering<'_, C> {
         } = self;
         pixels.fill([0.0; 4]);
         for tile in &band.tiles {
-            of_tile::<V, C>(token, ewa, views, tile, width, pixels);
+            of_tile::<V>(token, ewa, views, tile, width, pixels);
         }
         for of_pixel in band.singles.chunk_by(|a, b| a.pixel == b.pixel) {
-            pixels[of_pixel[0].pixel as usize] = of_singles::<V, C>(token, ewa, views, of_pixel);
+            pixels[of_pixel[0].pixel as usize] = of_singles::<V>(token, ewa, views, of_pixel);
         }
         for &(pixel, coverage) in &band.rim {
             for value in &mut pixels[pixel as usize] {
@@ -42,7 +42,7 @@ impl<const C: usize> Work for Filtering<'_, C> {
 }
 
 #[inline(always)]
-fn of_tile<V: Vector, const C: usize>(
+fn of_tile<V: Vector>(
     token: V::Token,
     ewa: &Ewa,
     views: &Views,
@@ -67,7 +67,9 @@ fn of_tile<V: Vector, const C: usize>(
         }
         let [u, v] = value;
         for (chunk, pixels) in pixels.chunks_mut(LANES).enumerate() {
+            // Lanes beyond the tile stay at its last column.
             let x = V::count(token) + V::all(token, (chunk * LANES) as f32 - middle[0]);
+            let x = x.min(V::all(token, middle[0]));
             let centre = [x.polynomial(token, &u), x.polynomial(token, &v)];
             let steps = [
                 x.polynomial(token, &[u[1], 2.0 * u[2]]),
@@ -76,14 +78,16 @@ fn of_tile<V: Vector, const C: usize>(
                 x.polynomial(token, &slope[1]),
             ];
             let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps);
+            if let Some(means) = ewa.of_eight::<V>(token, &levels[0], tile.base, &footprints) {
+                pixels.copy_from_slice(&means[..pixels.len()]);
+                continue;
+            }
             let [ux, vx, uy, vy] = steps;
             let arrays = [ux.array(), vx.array(), uy.array(), vy.array()];
             for (lane, pixel) in pixels.iter_mut().enumerate() {
                 let [ux, vx, uy, vy] = &arrays;
                 let derivatives = [ux[lane], vx[lane], uy[lane], vy[lane]];
-                let mean =
-                    ewa.of_lane::<V, C>(token, levels, tile.base, &footprints, derivatives, lane);
-                *pixel = with_opacity(mean);
+                *pixel = ewa.of_lane::<V>(token, levels, tile.base, &footprints, derivatives, lane);
             }
         }
     }
@@ -91,20 +95,20 @@ fn of_tile<V: Vector, const C: usize>(
 
 /// A pixel from its parts, as the first and differences to it, so that equal parts give just that.
 #[inline(always)]
-fn of_singles<V: Vector, const C: usize>(
+fn of_singles<V: Vector>(
     token: V::Token,
     ewa: &Ewa,
     views: &Views,
     singles: &[Single],
 ) -> [f32; 4] {
-    let mut result = [0.0; C];
-    let mut first = [0.0; C];
+    let mut result = [0.0; 4];
+    let mut first = [0.0; 4];
     for (index, single) in singles.iter().enumerate() {
         let centre = single.part.map(|x| V::all(token, x));
         let steps = single.derivatives.map(|x| V::all(token, x));
         let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps);
         let levels = views.pyramid(single.view as usize);
-        let mean: [f32; C] = ewa.of_lane::<V, C>(
+        let mean: [f32; 4] = ewa.of_lane::<V>(
             token,
             levels,
             single.base,
@@ -115,18 +119,10 @@ fn of_singles<V: Vector, const C: usize>(
         if index == 0 {
             (result, first) = (mean, mean);
         } else {
-            for k in 0..C {
+            for k in 0..4 {
                 result[k] += single.weight * (mean[k] - first[k]);
             }
         }
     }
-    with_opacity(result)
-}
-
-/// RGBA of what has three channels, and is opaque, or four.
-#[inline(always)]
-fn with_opacity<const C: usize>(mean: [f32; C]) -> [f32; 4] {
-    let mut pixel = [1.0; 4];
-    pixel[..C].copy_from_slice(&mean);
-    pixel
+    result
 }

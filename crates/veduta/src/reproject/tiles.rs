@@ -2,6 +2,8 @@
 //! is not.
 
 use super::mapping::{Mapping, Place};
+use super::parts::VARIANCE;
+use super::polynomial::{COEFFICIENTS, Polynomial};
 use crate::filter::ewa::{Ewa, LANES, Measuring, vectorized};
 use veduta_geometry::DVec2;
 
@@ -12,14 +14,12 @@ pub(super) const TILE: u32 = 16;
 /// detail; smaller costs more tiles.
 const MOST_ERROR: f64 = 1.0 / 128.0;
 
-/// By which part of themselves derivatives may change over a pixel before it is filtered in parts.
-const MOST_CHANGE: f64 = 0.5;
+/// By which part of themselves derivatives may change over a pixel before it is filtered in parts. Half as much takes
+/// twice as many pixels along rims; twice as much doubles the error there.
+pub(super) const MOST_CHANGE: f64 = 0.1;
 
 /// Derivatives smaller than this, in texels, may change as they like: the filter is larger.
-const LEAST_STEP: f64 = 0.25;
-
-/// How many coefficients a polynomial of second degree in x and in y has.
-const COEFFICIENTS: usize = 9;
+pub(super) const LEAST_STEP: f64 = 0.25;
 
 /// A tile: a rectangle of pixels that lie in one view.
 #[derive(Clone, Debug)]
@@ -180,11 +180,7 @@ impl Cutter<'_> {
                 _ => return Fit::None,
             }
         }
-        if let Some(period) = mapping.sources[view].period() {
-            for node in &mut nodes {
-                node.x -= ((node.x - centre.texel.x) / period).round() * period;
-            }
-        }
+        let nodes = nodes.map(|node| mapping.nearest(view, node, centre.texel));
         let base = centre.texel.floor();
         let polynomial = Polynomial::through(&nodes.map(|at| at - base), half);
         // Between the nodes, where the first neglected terms are largest.
@@ -230,124 +226,11 @@ impl Cutter<'_> {
             size,
             view: view as u32,
             base: [base.x as i32, base.y as i32],
-            texel: polynomial.coefficients(),
+            texel: polynomial.averaged(VARIANCE).coefficients(),
         })
     }
 
-    /// A pixel on its own, in parts where the mapping bends too much for one ellipse.
-    fn pixel(&mut self, column: u32, row: u32) {
-        let target = self.mapping.target;
-        let coverage = target.coverage(column, row);
-        if coverage <= 0.0 {
-            return;
-        }
-        let pixel = (row - self.top) * target.width + column;
-        let centre = self.inside(DVec2::new(f64::from(column), f64::from(row)) + 0.5);
-        if coverage < 1.0 {
-            self.band.rim.push((pixel, coverage as f32));
-        }
-        let Some(place) = self.mapping.place(centre) else {
-            self.missing(centre, coverage);
-            return;
-        };
-        self.band.found.covered += coverage;
-        self.band.found.pixels[place.view] += coverage;
-        let parts = self.parts(centre, &place);
-        if parts == 1 {
-            self.single(pixel, 1.0, &place, 1.0);
-            return;
-        }
-        let first = self.band.singles.len();
-        let mut sum = 0.0;
-        // The Gaussian of radius 1, less what the parts' own have of it.
-        let n = f64::from(parts);
-        let sharpness = 2.0 / (1.0 - 1.0 / (n * n));
-        for j in 0..2 * parts {
-            for i in 0..2 * parts {
-                let away = (DVec2::new(f64::from(i), f64::from(j)) + 0.5) / n - 1.0;
-                let weight = (-sharpness * away.length_squared()).exp();
-                let at = centre + away;
-                if away.length_squared() > 1.0
-                    || !target.lens.covers(target.lens_from_image(at)) && target.lens.is_round()
-                {
-                    continue;
-                }
-                if let Some(place) = self.mapping.place(at) {
-                    self.single(pixel, weight, &place, 1.0 / n);
-                    sum += weight;
-                }
-            }
-        }
-        for single in &mut self.band.singles[first..] {
-            single.weight /= sum as f32;
-        }
-    }
-
-    /// In how many parts along each side a pixel is to be filtered.
-    fn parts(&self, centre: DVec2, place: &Place) -> u32 {
-        if !place.derivatives.iter().all(|step| step.is_finite()) {
-            return 8;
-        }
-        let mut most: f64 = 0.0;
-        for axis in [DVec2::X, DVec2::Y] {
-            let at = |side: f64| self.mapping.place_in(place.view, centre + side * axis);
-            let (Some(ahead), Some(behind)) = (at(0.5), at(-0.5)) else {
-                return 8;
-            };
-            for k in 0..2 {
-                let change = (ahead.derivatives[k] - behind.derivatives[k]).length();
-                let change = change / place.derivatives[k].length().max(2.0 * LEAST_STEP);
-                most = most.max(if change.is_nan() {
-                    f64::INFINITY
-                } else {
-                    change
-                });
-            }
-        }
-        match most {
-            _ if most <= MOST_CHANGE => 1,
-            _ if most <= 2.0 * MOST_CHANGE => 2,
-            _ if most <= 4.0 * MOST_CHANGE => 4,
-            _ => 8,
-        }
-    }
-
-    fn single(&mut self, pixel: u32, weight: f64, place: &Place, scale: f64) {
-        let base = place.texel.floor();
-        let part = place.texel - base;
-        let [x, y] = place.derivatives.map(|step| step * scale);
-        let reach = self.measure([[x, y]; 8]);
-        self.take(place.view, &[place.texel], DVec2::splat(f64::from(reach)));
-        self.band.singles.push(Single {
-            pixel,
-            weight: weight as f32,
-            view: place.view as u32,
-            base: [base.x as i32, base.y as i32],
-            part: [part.x as f32, part.y as f32],
-            derivatives: [x.x, x.y, y.x, y.y].map(|d| d as f32),
-        });
-    }
-
-    /// Nearest point that the lens shows, a little inside.
-    fn inside(&self, image: DVec2) -> DVec2 {
-        let target = self.mapping.target;
-        let point = target.lens_from_image(image);
-        if !target.lens.is_round() || target.lens.covers(point) {
-            return image;
-        }
-        let mut point = point.clamp_length_max(1.0 - 1e-9);
-        // Towards the middle, as far as the arc asks for; a pixel reaches less than its diagonal over it.
-        let step = point * (0.125 / target.pixels_per_unit()).min(1.0) / point.length().max(1e-9);
-        for _ in 0..16 {
-            if target.lens.covers(point) {
-                break;
-            }
-            point -= step;
-        }
-        target.image_from_lens(point)
-    }
-
-    fn missing(&mut self, image: DVec2, pixels: f64) {
+    pub(super) fn missing(&mut self, image: DVec2, pixels: f64) {
         let found = &mut self.band.found;
         found.covered += pixels;
         let Some(direction) = self.mapping.target.direction(image) else {
@@ -359,7 +242,7 @@ impl Cutter<'_> {
     }
 
     /// Notes how large footprints are; gives the largest reach.
-    fn measure(&mut self, steps: [[DVec2; 2]; 8]) -> f32 {
+    pub(super) fn measure(&mut self, steps: [[DVec2; 2]; 8]) -> f32 {
         let lanes = |f: &dyn Fn(&[DVec2; 2]) -> f64| -> [f32; LANES] {
             std::array::from_fn(|k| f(&steps[k]) as f32)
         };
@@ -384,7 +267,7 @@ impl Cutter<'_> {
     }
 
     /// Notes which texels are read.
-    fn take(&mut self, view: usize, at: &[DVec2], reach: DVec2) {
+    pub(super) fn take(&mut self, view: usize, at: &[DVec2], reach: DVec2) {
         let window = &mut self.band.found.windows[view];
         for &at in at {
             let [low, high] = window.get_or_insert([at - reach, at + reach]);
@@ -423,70 +306,4 @@ fn changes(step: &[DVec2; 2], change: &[DVec2; 2]) -> bool {
     step.iter()
         .zip(change)
         .any(|(step, change)| change.length() > MOST_CHANGE * step.length().max(2.0 * LEAST_STEP))
-}
-
-/// Of second degree in x and in y.
-struct Polynomial {
-    coefficients: [DVec2; COEFFICIENTS],
-}
-
-impl Polynomial {
-    /// Through values at the nodes -half, 0 and half of each axis, rows from the top.
-    fn through(nodes: &[DVec2; 9], half: DVec2) -> Self {
-        let along = |a: DVec2, b: DVec2, c: DVec2, half: f64| {
-            [
-                b,
-                (c - a) / (2.0 * half),
-                (c - 2.0 * b + a) / (2.0 * half * half),
-            ]
-        };
-        let rows =
-            [0, 1, 2].map(|j| along(nodes[3 * j], nodes[3 * j + 1], nodes[3 * j + 2], half.x));
-        let mut coefficients = [DVec2::ZERO; COEFFICIENTS];
-        for i in 0..3 {
-            let of_power = along(rows[0][i], rows[1][i], rows[2][i], half.y);
-            for (j, value) in of_power.into_iter().enumerate() {
-                coefficients[3 * j + i] = value;
-            }
-        }
-        Self { coefficients }
-    }
-
-    fn at(&self, DVec2 { x, y }: DVec2) -> DVec2 {
-        let c = &self.coefficients;
-        let row = |j: usize| c[3 * j] + x * (c[3 * j + 1] + x * c[3 * j + 2]);
-        row(0) + y * (row(1) + y * row(2))
-    }
-
-    fn derivatives(&self, DVec2 { x, y }: DVec2) -> [DVec2; 2] {
-        let c = &self.coefficients;
-        let along = |j: usize| c[3 * j + 1] + 2.0 * x * c[3 * j + 2];
-        let row = |j: usize| c[3 * j] + x * (c[3 * j + 1] + x * c[3 * j + 2]);
-        [
-            along(0) + y * (along(1) + y * along(2)),
-            row(1) + 2.0 * y * row(2),
-        ]
-    }
-
-    /// How much the derivatives by x and by y change over a pixel, about: along their own axis and the other.
-    fn changes(&self) -> [DVec2; 2] {
-        let c = &self.coefficients;
-        let (xx, xy, yy) = (2.0 * c[2].abs(), c[4].abs(), 2.0 * c[6].abs());
-        [xx.max(xy), yy.max(xy)]
-    }
-
-    /// How far between the nodes it may be beyond them.
-    fn bend(&self, half: DVec2) -> DVec2 {
-        let c = &self.coefficients;
-        0.25 * (c[2].abs() * half.x * half.x
-            + c[6].abs() * half.y * half.y
-            + c[4].abs() * half.x * half.y)
-    }
-
-    fn coefficients(&self) -> [[f32; COEFFICIENTS]; 2] {
-        [
-            self.coefficients.map(|c| c.x as f32),
-            self.coefficients.map(|c| c.y as f32),
-        ]
-    }
 }

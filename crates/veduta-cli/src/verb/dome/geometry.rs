@@ -69,35 +69,30 @@ impl Filtering {
 
 /// What is seen where in the pictures of one eye: for all frames of a sequence.
 pub struct Geometry {
-    parts: Vec<Part>,
-}
-
-/// One picture.
-struct Part {
-    reprojection: Reprojection,
+    pictures: Vec<Reprojection>,
     /// The room for the views' pictures, from frame to frame.
-    views: Option<Views>,
+    views: Views,
 }
 
 impl Geometry {
-    /// Works out where the pixels of `targets` lie in `views`.
+    /// Works out where the pixels of `targets`, of which there is one at least, lie in `views`.
     pub fn new(views: &[Projection], targets: &[Projection], filtering: &Filtering) -> Self {
         let ewa = filtering.ewa();
-        let part = |target: &Projection| Part {
-            reprojection: Reprojection::new(views, target, &ewa),
-            views: None,
-        };
+        let pictures = targets.iter();
+        let pictures = pictures.map(|target| Reprojection::new(views, target, &ewa));
+        let pictures: Vec<Reprojection> = pictures.collect();
         Self {
-            parts: targets.iter().map(part).collect(),
+            views: Reprojection::views_of(&pictures),
+            pictures,
         }
     }
 
     /// What no view shows: names of sides of a cube, and their shares of all pictures.
     pub fn missing(&self) -> Vec<(&'static str, f64)> {
         let mut sums: Vec<(&'static str, f64)> = Vec::new();
-        for part in &self.parts {
-            for (name, share) in part.reprojection.missing().toward {
-                let share = share / self.parts.len() as f64;
+        for picture in &self.pictures {
+            for (name, share) in picture.missing().toward {
+                let share = share / self.pictures.len() as f64;
                 match sums.iter_mut().find(|(known, _)| *known == name) {
                     Some((_, sum)) => *sum += share,
                     None => sums.push((name, share)),
@@ -110,21 +105,13 @@ impl Geometry {
 
     /// Makes the pictures of a frame from those of its views.
     pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
-        let opaque = views.iter().all(Picture::is_opaque);
-        let is_alone = self.parts.len() == 1;
-        let make = |part: &mut Part| {
-            let channels = if opaque { 3 } else { 4 };
-            let kept = part.views.take().filter(|kept| kept.channels() == channels);
-            let mut planes = kept.unwrap_or_else(|| part.reprojection.views(opaque));
-            for (view, picture) in views.iter().enumerate() {
-                planes.set(view, picture);
-            }
-            planes.complete();
-            let picture = part.reprojection.picture(&planes);
-            // The room of six sides at once would be too much.
-            part.views = is_alone.then_some(planes);
-            picture
-        };
-        self.parts.iter_mut().map(make).collect()
+        for (view, picture) in views.iter().enumerate() {
+            self.views.set(view, picture);
+        }
+        self.views.complete();
+        let pictures = self.pictures.iter();
+        pictures
+            .map(|picture| picture.picture(&self.views))
+            .collect()
     }
 }

@@ -125,6 +125,11 @@ impl Aim {
         self.lens == LensOrCube::Cube
     }
 
+    /// Whether six sides are made that do not go into one picture.
+    pub fn makes_six_files(&self) -> bool {
+        self.is_cube() && self.to_layout.is_none()
+    }
+
     /// How two eyes go into one picture.
     pub fn stereo(&self) -> Option<Stereo> {
         self.stereo

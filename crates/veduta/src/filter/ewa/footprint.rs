@@ -13,9 +13,14 @@ pub(crate) struct Footprints {
     pub centre: [[f32; LANES]; 2],
     /// `a`, `b` and `c`.
     pub equation: [[f32; LANES]; 3],
-    /// First column and row inside, and how many there may be, from the base.
+    /// First column and row inside, from the base.
     pub first: [[i32; LANES]; 2],
+    /// Of that first texel, from the centre.
+    pub start: [[f32; LANES]; 2],
+    /// How many columns and rows there may be inside.
     pub count: [[i32; LANES]; 2],
+    /// Column and row of the texel nearest to the centre, from the base.
+    pub middle: [[i32; LANES]; 2],
     /// Share of the profile of radius 2.
     pub round: [f32; LANES],
     /// Largest half extent of the box around, texels.
@@ -76,23 +81,16 @@ impl Footprints {
         Self {
             centre: [u.array(), v.array()],
             equation: [a.array(), b.array(), c.array()],
-            first: [whole(first_u), whole(first_v)],
-            count: [whole(count_u), whole(count_v)],
+            first: [first_u.whole(), first_v.whole()],
+            start: [(first_u - u).array(), (first_v - v).array()],
+            count: [count_u.whole(), count_v.whole()],
+            middle: [
+                (u + all(0.5)).floor().whole(),
+                (v + all(0.5)).floor().whole(),
+            ],
             round: round.array(),
             reach: du.max(dv).array(),
             minor: minor.array(),
         }
     }
-}
-
-/// Lanes of whole numbers as such.
-#[inline(always)]
-fn whole<V: Vector>(lanes: V) -> [i32; LANES] {
-    let lanes = lanes.array();
-    let mut whole = [0; LANES];
-    for (whole, x) in whole.iter_mut().zip(lanes) {
-        // No case for numbers beyond all texels: they are not read.
-        *whole = x as i32;
-    }
-    whole
 }

@@ -46,8 +46,20 @@ pub(crate) trait Vector:
     /// `yes` in lanes below `bound`, `no` in others.
     fn below(self, bound: Self, yes: Self, no: Self) -> Self;
 
-    /// The sums over the lanes of four: of neighbours, of neighbouring pairs, of both halves.
-    fn sums(of: [Self; 4]) -> [f32; 4];
+    /// Whether the numbers of all lanes are `bound` or less.
+    fn all_at_most(self, bound: Self) -> bool;
+
+    /// The numbers without what follows the point; `i32::MIN` for those that no `i32` is.
+    fn whole(self) -> [i32; LANES];
+
+    /// Lane `k` of the first half four times, and lane `k` of the second.
+    fn spread(self, k: usize) -> Self;
+
+    /// In the first four lanes what the halves of `a` sum up to, in the others the same of `b`.
+    fn halves(a: Self, b: Self) -> Self;
+
+    /// In each lane the sum of the four of its half, summed by neighbours first.
+    fn quarters(self) -> Self;
 
     /// The first of a slice's numbers.
     ///
@@ -63,6 +75,15 @@ pub(crate) trait Vector:
     #[inline(always)]
     fn count(token: Self::Token) -> Self {
         Self::of(token, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    }
+
+    /// Two texels.
+    ///
+    /// # Panics
+    /// If there are not two.
+    #[inline(always)]
+    fn two(token: Self::Token, texels: &[[f32; 4]]) -> Self {
+        Self::load(token, texels.as_flattened())
     }
 
     /// The polynomial with these coefficients, lowest power first, at the lanes' numbers.
@@ -197,8 +218,47 @@ impl Vector for Plain {
     }
 
     #[inline(always)]
-    fn sums(of: [Self; 4]) -> [f32; 4] {
-        of.map(|Self(x)| ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7])))
+    fn all_at_most(self, bound: Self) -> bool {
+        (0..LANES).all(|k| self.0[k] <= bound.0[k])
+    }
+
+    #[inline(always)]
+    fn whole(self) -> [i32; LANES] {
+        // The next number below is one of i32's.
+        const BEYOND: f32 = 2_147_483_648.0;
+        let whole = |x: f32| {
+            if (-BEYOND..BEYOND).contains(&x) {
+                x as i32
+            } else {
+                i32::MIN
+            }
+        };
+        self.0.map(whole)
+    }
+
+    #[inline(always)]
+    fn spread(self, k: usize) -> Self {
+        let (low, high) = (self.0[k], self.0[4 + k]);
+        Self([low, low, low, low, high, high, high, high])
+    }
+
+    #[inline(always)]
+    fn halves(Self(a): Self, Self(b): Self) -> Self {
+        let of = |k: usize| {
+            if k < 4 {
+                a[k] + a[k + 4]
+            } else {
+                b[k - 4] + b[k]
+            }
+        };
+        Self(std::array::from_fn(of))
+    }
+
+    #[inline(always)]
+    fn quarters(self) -> Self {
+        let [a, b, c, d, e, f, g, h] = self.0;
+        let [low, high] = [(a + b) + (c + d), (e + f) + (g + h)];
+        Self([low, low, low, low, high, high, high, high])
     }
 }
 
@@ -334,12 +394,40 @@ mod avx2 {
         }
 
         #[inline(always)]
-        fn sums([a, b, c, d]: [Self; 4]) -> [f32; 4] {
+        fn all_at_most(self, bound: Self) -> bool {
+            let mask = self.token.cmp_le_f32x8(self.lanes, bound.lanes);
+            self.token.avx._mm256_movemask_ps(cast(mask)) == 0xff
+        }
+
+        #[inline(always)]
+        fn whole(self) -> [i32; LANES] {
+            cast(self.token.avx._mm256_cvttps_epi32(cast(self.lanes)))
+        }
+
+        #[inline(always)]
+        fn spread(self, k: usize) -> Self {
+            let (avx, lanes) = (self.token.avx, cast(self.lanes));
+            self.with(cast(match k {
+                0 => avx._mm256_permute_ps::<0x00>(lanes),
+                1 => avx._mm256_permute_ps::<0x55>(lanes),
+                2 => avx._mm256_permute_ps::<0xaa>(lanes),
+                _ => avx._mm256_permute_ps::<0xff>(lanes),
+            }))
+        }
+
+        #[inline(always)]
+        fn halves(a: Self, b: Self) -> Self {
             let avx = a.token.avx;
-            let pairs = |a: Self, b: Self| avx._mm256_hadd_ps(cast(a.lanes), cast(b.lanes));
-            let quarters: [f32; LANES] = cast(avx._mm256_hadd_ps(pairs(a, b), pairs(c, d)));
-            let [a, b, c, d, e, f, g, h] = quarters;
-            [a + e, b + f, c + g, d + h]
+            let low = avx._mm256_permute2f128_ps::<0x20>(cast(a.lanes), cast(b.lanes));
+            let high = avx._mm256_permute2f128_ps::<0x31>(cast(a.lanes), cast(b.lanes));
+            a.with(a.token.add_f32x8(cast(low), cast(high)))
+        }
+
+        #[inline(always)]
+        fn quarters(self) -> Self {
+            let avx = self.token.avx;
+            let pairs = avx._mm256_hadd_ps(cast(self.lanes), cast(self.lanes));
+            self.with(cast(avx._mm256_hadd_ps(pairs, pairs)))
         }
     }
 }
@@ -357,8 +445,9 @@ mod tests {
         #[inline(always)]
         fn run<V: Vector>(self, token: V::Token) -> Self::Output {
             let (a, b) = (V::of(token, self.0), V::load(token, &self.1));
-            let sums = V::sums([a, b, a * b, a - b]);
-            let sums = std::array::from_fn(|k| sums[k % 4]);
+            let large = V::of(token, self.1.map(|x| x * 1e8));
+            let as_numbers = |whole: [i32; LANES]| V::of(token, whole.map(|x| x as f32));
+            let is_at_most = V::all(token, f32::from(u8::from(a.all_at_most(b))));
             let results = [
                 a + b,
                 a.mul_add(b, a),
@@ -370,7 +459,12 @@ mod tests {
                 b.ceil(),
                 a.below(b, V::count(token), V::all(token, 2.5)),
                 b.polynomial(token, &[0.3, -1.7, 0.1]),
-                V::of(token, sums),
+                as_numbers(a.whole()),
+                as_numbers(large.whole()),
+                is_at_most,
+                a.spread(1),
+                V::halves(a, b),
+                b.quarters(),
             ];
             results.map(|v| v.array().map(f32::to_bits)).to_vec()
         }

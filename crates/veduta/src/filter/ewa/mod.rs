@@ -2,7 +2,7 @@
 //! pixel the weighted mean of the texels inside.
 //!
 //! After Ned Greene & Paul Heckbert, "Creating raster Omnimax images from multiple perspective views using the elliptical
-//! weighted average filter" (1986). Comes in: a texture as [`Planes`], and of a pixel where its centre lies in it and
+//! weighted average filter" (1986). Comes in: a texture as [`Texels`], and of a pixel where its centre lies in it and
 //! the derivatives of the mapping. Goes out: the mean. In order:
 //!
 //! 1. `footprint`: from the derivatives to the ellipse, of eight pixels at once;
@@ -26,9 +26,9 @@ pub use profile::Profile;
 
 pub(crate) use footprint::Footprints;
 pub(crate) use lanes::{LANES, Vector, Work, vectorized};
-pub(crate) use scan::mean;
+use scan::{MOST_OF_EIGHT, mean, means};
 
-use super::Planes;
+use super::Texels;
 
 /// How the elliptical filter filters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,20 +69,14 @@ impl Ewa {
     /// The mean of a footprint with its centre at (`u`, `v`), in texels with centres at whole numbers, and derivatives
     /// `[ux, vx, uy, vy]` by the pixel's x and y.
     ///
-    /// `levels` is a pyramid with filled aprons, finest first ([`Planes::halved`]), of `C` channels; one level will
-    /// do where [`pyramid`](Self::pyramid) is `None`. The centre lies in the picture, or not more than a texel
-    /// outside.
+    /// `levels` is a pyramid with filled aprons, finest first ([`Texels::halved`]); one level will do where
+    /// [`pyramid`](Self::pyramid) is `None`. The centre lies in the picture, or not more than a texel outside.
     ///
     /// # Panics
-    /// If the planes have not `C` channels, an apron narrower than [`LEAST_APRON`], or the centre lies farther outside.
-    pub fn sample<const C: usize>(
-        &self,
-        levels: &[Planes],
-        [u, v]: [f64; 2],
-        derivatives: [f32; 4],
-    ) -> [f32; C] {
+    /// If the apron is narrower than [`LEAST_APRON`], or the centre lies farther outside.
+    pub fn sample(&self, levels: &[Texels], [u, v]: [f64; 2], derivatives: [f32; 4]) -> [f32; 4] {
         let base = [u.floor(), v.floor()];
-        vectorized(Sampling::<C> {
+        vectorized(Sampling {
             ewa: self,
             levels,
             base: base.map(|x| x as i32),
@@ -91,25 +85,48 @@ impl Ewa {
         })
     }
 
-    /// The mean of one of eight footprints, whose derivatives are told again.
+    /// The means of eight footprints; `None` where one of them asks for more than the quick way gives.
     #[inline(always)]
-    pub(crate) fn of_lane<V: Vector, const C: usize>(
+    pub(crate) fn of_eight<V: Vector>(
         &self,
         token: V::Token,
-        levels: &[Planes],
+        finest: &Texels,
+        base: [i32; 2],
+        footprints: &Footprints,
+    ) -> Option<[[f32; 4]; LANES]> {
+        let (reach, minor) = (
+            V::of(token, footprints.reach),
+            V::of(token, footprints.minor),
+        );
+        // No closures here: what the compiler does not inline has no vector instructions.
+        if self.clamp
+            || !reach.all_at_most(V::all(token, MOST_OF_EIGHT))
+            || !minor.all_at_most(V::all(token, self.most_squared()))
+        {
+            return None;
+        }
+        Some(means::<V>(token, self, finest, base, footprints))
+    }
+
+    /// The mean of one of eight footprints, whose derivatives are told again.
+    #[inline(always)]
+    pub(crate) fn of_lane<V: Vector>(
+        &self,
+        token: V::Token,
+        levels: &[Texels],
         base: [i32; 2],
         footprints: &Footprints,
         derivatives: [f32; 4],
         lane: usize,
-    ) -> [f32; C] {
-        let planes = &levels[0];
-        let near = footprints.reach[lane] <= planes.apron() as f32 - MARGIN;
+    ) -> [f32; 4] {
+        let texels = &levels[0];
+        let near = footprints.reach[lane] <= texels.apron() as f32 - MARGIN;
         let small = footprints.minor[lane] <= self.most_squared();
         if near && small {
-            return mean::<V, C>(token, self, planes, base, footprints, lane);
+            return mean::<V>(token, self, texels, base, footprints, lane);
         }
         let part = footprints.centre.map(|centre| centre[lane]);
-        self.large::<V, C>(token, levels, base, part, derivatives)
+        self.large::<V>(token, levels, base, part, derivatives)
     }
 
     /// Squared minor radius above which a pyramid is used.
@@ -131,14 +148,14 @@ impl Ewa {
 
     /// A footprint that is too large for the finest level or its apron.
     #[inline(always)]
-    fn large<V: Vector, const C: usize>(
+    fn large<V: Vector>(
         &self,
         token: V::Token,
-        levels: &[Planes],
+        levels: &[Texels],
         base: [i32; 2],
         part: [f32; 2],
         derivatives: [f32; 4],
-    ) -> [f32; C] {
+    ) -> [f32; 4] {
         // At a pole or a rim they may be without bound; nothing is larger than all of the picture.
         let most = 2.0 * levels[0].width().max(levels[0].height()) as f32;
         let derivatives = derivatives.map(|d| {
@@ -153,10 +170,10 @@ impl Ewa {
         let level = self.level(minor_squared(derivatives)).min(last as f32);
         let (finer, share) = (level.floor() as usize, level.fract());
         let count = if share > 0.0 { 2 } else { 1 };
-        let mut result = [0.0; C];
+        let mut result = [0.0; 4];
         for index in 0..count {
-            let mean: [f32; C] =
-                self.at_level::<V, C>(token, levels, finer + index, centre, derivatives);
+            let mean: [f32; 4] =
+                self.at_level::<V>(token, levels, finer + index, centre, derivatives);
             // The second by its difference to the first, so that equal values stay what they are.
             let part = if index == 0 { 1.0 } else { share };
             result = std::array::from_fn(|k| part.mul_add(mean[k] - result[k], result[k]));
@@ -166,29 +183,29 @@ impl Ewa {
 
     /// The mean at one level, or at the first coarser one in which the footprint stays within the apron.
     #[inline(always)]
-    fn at_level<V: Vector, const C: usize>(
+    fn at_level<V: Vector>(
         &self,
         token: V::Token,
-        levels: &[Planes],
+        levels: &[Texels],
         level: usize,
         centre: [f64; 2],
         derivatives: [f32; 4],
-    ) -> [f32; C] {
+    ) -> [f32; 4] {
         let mut level = level;
         loop {
-            let planes = &levels[level];
+            let texels = &levels[level];
             let scale = 1.0 / f64::from(1_u32 << level);
             let centre = centre.map(|x| (x + 0.5) * scale - 0.5);
             let base = centre.map(f64::floor);
             let part = [0, 1].map(|k| V::all(token, (centre[k] - base[k]) as f32));
             let variance = (0..level).fold(self.variance, |finer, _| 0.25 * (finer + 0.75));
-            let limit = planes.apron() as f32 - MARGIN;
+            let limit = texels.apron() as f32 - MARGIN;
             let mut scaled = derivatives.map(|d| d * scale as f32);
             let all = |derivatives: [f32; 4]| derivatives.map(|d| V::all(token, d));
             let mut footprints = Footprints::new(token, self, variance, part, all(scaled));
             let reach = footprints.reach[0];
-            if reach > limit && planes.repeats() {
-                return plain::around(self, planes, centre, &footprints);
+            if reach > limit && texels.repeats() {
+                return plain::around(self, texels, centre, &footprints);
             }
             if reach > limit && level + 1 < levels.len() {
                 level += 1;
@@ -200,30 +217,30 @@ impl Ewa {
                 footprints = Footprints::new(token, self, variance, part, all(scaled));
             }
             let base = base.map(|x| x as i32);
-            return mean::<V, C>(token, self, planes, base, &footprints, 0);
+            return mean::<V>(token, self, texels, base, &footprints, 0);
         }
     }
 }
 
 /// [`Ewa::sample`], to be inlined where the vector instructions are known.
-struct Sampling<'a, const C: usize> {
+struct Sampling<'a> {
     ewa: &'a Ewa,
-    levels: &'a [Planes],
+    levels: &'a [Texels],
     base: [i32; 2],
     part: [f32; 2],
     derivatives: [f32; 4],
 }
 
-impl<const C: usize> Work for Sampling<'_, C> {
-    type Output = [f32; C];
+impl Work for Sampling<'_> {
+    type Output = [f32; 4];
 
     #[inline(always)]
-    fn run<V: Vector>(self, token: V::Token) -> [f32; C] {
+    fn run<V: Vector>(self, token: V::Token) -> [f32; 4] {
         let all = |value: f32| V::all(token, value);
         let (ewa, steps) = (self.ewa, self.derivatives);
         let centre = self.part.map(all);
         let footprints = Footprints::new(token, ewa, ewa.variance, centre, steps.map(all));
-        ewa.of_lane::<V, C>(token, self.levels, self.base, &footprints, steps, 0)
+        ewa.of_lane::<V>(token, self.levels, self.base, &footprints, steps, 0)
     }
 }
 
@@ -257,19 +274,19 @@ mod tests {
     use super::*;
 
     /// Numbers without a pattern, a pyramid of one level.
-    fn noise() -> Vec<Planes> {
-        let mut planes = Planes::new(40, 40, 3, 24);
+    fn noise() -> Vec<Texels> {
+        let mut texels = Texels::new(40, 40, 24);
         let mut seed = 7_u32;
-        for row in planes.rows() {
-            for column in planes.columns() {
+        for row in texels.rows() {
+            for column in texels.columns() {
                 let texel = [0; 4].map(|_| {
                     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                     (seed >> 8) as f32 / 16_777_216.0
                 });
-                planes.set(column, row, texel);
+                texels.set(column, row, texel);
             }
         }
-        vec![planes]
+        vec![texels]
     }
 
     /// Derivatives of footprints from much smaller than a texel to some twenty across, turned and skewed.
@@ -322,13 +339,10 @@ mod tests {
                     centre,
                     equation: of.equation.map(|lanes| f64::from(lanes[0])),
                 };
-                let texel = |column: i32, row: i32| {
-                    let [r, g, b, _] = levels[0].texel(column, row);
-                    [r, g, b]
-                };
+                let texel = |column: i32, row: i32| levels[0].texel(column, row);
                 let printed = plain::mean(texel, &ellipse, plain::weights(profile, of.round[0]));
                 let printed = printed.expect("a texel inside");
-                let quick: [f32; 3] = ewa.sample(&levels, centre, steps);
+                let quick = ewa.sample(&levels, centre, steps);
                 for (quick, printed) in quick.into_iter().zip(printed) {
                     let off = (quick - printed).abs();
                     // A texel at the very end of a Gaussian may count in one and not in the other.
@@ -338,11 +352,71 @@ mod tests {
         }
     }
 
+    /// Eight footprints at once, with the same base.
+    struct Eight<'a> {
+        ewa: &'a Ewa,
+        finest: &'a Texels,
+        centre: [[f32; LANES]; 2],
+        derivatives: [[f32; LANES]; 4],
+    }
+
+    impl Work for Eight<'_> {
+        type Output = Option<[[f32; 4]; LANES]>;
+
+        #[inline(always)]
+        fn run<V: Vector>(self, token: V::Token) -> Self::Output {
+            let centre = self.centre.map(|lanes| V::of(token, lanes));
+            let steps = self.derivatives.map(|lanes| V::of(token, lanes));
+            let footprints = Footprints::new(token, self.ewa, self.ewa.variance, centre, steps);
+            self.ewa
+                .of_eight::<V>(token, self.finest, [20, 19], &footprints)
+        }
+    }
+
+    #[test]
+    fn eight_at_once_are_each_alone_with_any_instructions() {
+        let levels = noise();
+        let all = footprints();
+        let mut quick = 0;
+        for profile in [Profile::Auto, Profile::Gaussian, Profile::Sharp] {
+            let ewa = Ewa {
+                profile,
+                ..Ewa::default()
+            };
+            // Of about one size, as in a picture, and of all sizes.
+            for (first, step) in (0..all.len()).flat_map(|first| [(first, 1), (first, 15)]) {
+                let steps: [[f32; 4]; LANES] =
+                    std::array::from_fn(|k| all[(first + step * k) % all.len()]);
+                let centre = |k: usize| [0.7 * k as f32 - 2.0, 0.3 * k as f32];
+                let eight = || Eight {
+                    ewa: &ewa,
+                    finest: &levels[0],
+                    centre: [0, 1].map(|axis| std::array::from_fn(|k| centre(k)[axis])),
+                    derivatives: [0, 1, 2, 3].map(|d| steps.map(|steps| steps[d])),
+                };
+                let found = vectorized(eight());
+                assert_eq!(found, eight().run::<lanes::Plain>(()));
+                let Some(means) = found else { continue };
+                quick += 1;
+                for (k, mean) in means.into_iter().enumerate() {
+                    let [u, v] = centre(k).map(f64::from);
+                    let alone = ewa.sample(&levels, [20.0 + u, 19.0 + v], steps[k]);
+                    for (mean, alone) in mean.into_iter().zip(alone) {
+                        // Sums in another order.
+                        let off = (mean - alone).abs();
+                        assert!(off < 1e-5, "{:?}: {mean} and {alone}", steps[k]);
+                    }
+                }
+            }
+        }
+        assert!(quick > 100, "{quick}");
+    }
+
     #[test]
     fn clamped_means_do_not_ring() {
-        let mut planes = Planes::new(16, 16, 3, 24);
-        planes.set(8, 8, [1000.0; 4]);
-        let levels = [planes];
+        let mut texels = Texels::new(16, 16, 24);
+        texels.set(8, 8, [1000.0; 4]);
+        let levels = [texels];
         let mut below = [false; 2];
         for (clamp, below) in [false, true].into_iter().zip(&mut below) {
             let ewa = Ewa {
@@ -351,7 +425,7 @@ mod tests {
             };
             for k in 0..64 {
                 let centre = [6.0 + f64::from(k % 8) * 0.5, 6.0 + f64::from(k / 8) * 0.5];
-                let mean: [f32; 3] = ewa.sample(&levels, centre, [0.8, 0.0, 0.0, 0.8]);
+                let mean = ewa.sample(&levels, centre, [0.8, 0.0, 0.0, 0.8]);
                 *below |= mean[0] < 0.0;
             }
         }

@@ -4,7 +4,7 @@
 use super::lanes::{Plain, Vector};
 use super::profile::{Gaussian, Mixture, Round, Weigh};
 use super::{Ewa, Footprints, Profile};
-use crate::filter::Planes;
+use crate::filter::Texels;
 use std::sync::OnceLock;
 
 /// Weights by the squared distance from the centre, 0 to 1 (the paper's WTAB).
@@ -112,20 +112,19 @@ pub fn mean<const C: usize>(
 }
 
 /// The mean of a footprint that reaches far around a texture whose columns repeat.
-pub(super) fn around<const C: usize>(
+pub(super) fn around(
     ewa: &Ewa,
-    planes: &Planes,
+    texels: &Texels,
     centre: [f64; 2],
     footprints: &Footprints,
-) -> [f32; C] {
+) -> [f32; 4] {
     let equation = footprints.equation.map(|lanes| f64::from(lanes[0]));
     let ellipse = Ellipse { centre, equation };
     let weights = weights(ewa.profile, footprints.round[0]);
-    let (width, rows) = (planes.width() as i32, planes.rows());
+    let (width, rows) = (texels.width() as i32, texels.rows());
     let texel = |column: i32, row: i32| {
         let row = row.clamp(rows.start, rows.end - 1);
-        let texel = planes.texel(column.rem_euclid(width), row);
-        std::array::from_fn(|k| texel[k])
+        texels.texel(column.rem_euclid(width), row)
     };
     mean(texel, &ellipse, weights).expect("a footprint holds the centre of a texel")
 }

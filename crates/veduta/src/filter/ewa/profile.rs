@@ -93,6 +93,16 @@ impl Round {
         coefficients: [1.0, -5.686_46, 10.913_013, -10.039_917, 3.339_355_4],
     };
 
+    /// That of a profile which is one of radius 2.
+    #[inline(always)]
+    pub fn of(profile: Profile) -> Self {
+        match profile {
+            Profile::Sharp => Self::SHARP,
+            Profile::Mitchell => Self::MITCHELL,
+            _ => Self::ROBIDOUX,
+        }
+    }
+
     /// The integral over q from 0 to 1.
     const fn integral(&self) -> f32 {
         let mut sum = 0.0;
