@@ -8,6 +8,7 @@ use veduta::accumulate::Picture;
 use veduta::geometry::{DMat3, DMat4, DVec2, DVec3, Vec2};
 use veduta::map::{self, Camera, MaterialId};
 use veduta::pipeline::{self, RenderSettings};
+use veduta::reproject::cube::Layout;
 use veduta::reproject::patches::{Subdivision, TOLERANCE};
 use veduta::reproject::{Lens, Orientation, Projection};
 use veduta::scene::{Image, ImageId, Material, Mesh, MeshId, Object, Scene, TextureRef};
@@ -595,14 +596,14 @@ fn only_what_a_lens_looks_at_is_found() {
         let projection = Projection::new(lens(name), orientation, 100, 78);
         let found = pipeline::find_surroundings(&scene, &eye, &projection, |_| {});
         found
-            .views
+            .sides
             .iter()
-            .map(|seen| seen.view.face.name())
+            .map(|seen| seen.part.side.name())
             .collect()
     };
     // The paper's four faces; the arc touches the bottom's border only.
-    assert_eq!(faces("omnimax", 0.0), ["front", "right", "left", "top"]);
-    let upper = ["front", "right", "back", "left", "top"];
+    assert_eq!(faces("omnimax", 0.0), ["front", "right", "left", "up"]);
+    let upper = ["front", "right", "back", "left", "up"];
     assert_eq!(faces("domemaster", FRAC_PI_2), upper);
     assert_eq!(faces("perspective:60", 0.0), ["front"]);
     assert_eq!(faces("equirect", 0.0).len(), 6);
@@ -630,13 +631,7 @@ fn the_faces_of_a_cube_fit_together() {
     let scene = ball_around(&mut Rng::new(6), 12, 16);
     let eye = eye(DVec3::Z, 0.3);
     let side = 64;
-    let settings = RenderSettings {
-        width: side,
-        height: side,
-        unlit: true,
-        ..RenderSettings::default()
-    };
-    let cross = pipeline::render_cube(&scene, &eye, &settings, |_| {});
+    let cross = pipeline::render_cube(&scene, &eye, &Layout::cross(), side, true, |_| {});
     assert_eq!((cross.width, cross.height), (4 * side, 3 * side));
     let at = |x: u32, y: u32| cross.pixels[(y * cross.width + x) as usize];
     let difference = |p: [u32; 2], q: [u32; 2]| {

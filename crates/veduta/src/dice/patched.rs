@@ -12,29 +12,42 @@ use super::coverage::summed;
 use super::place::PixelClip;
 use super::veils::{Ground, VeilBuffers, attenuate_on};
 use super::{Coverage, Diced, Part, Parts, Run};
-use crate::reproject::patches::{CubeView, Patch};
+use crate::reproject::patches::{Patch, Region, View};
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::ops::Range;
+use std::sync::Arc;
 use veduta_geometry::{Affine, Cells, DMat3, DVec2, DVec3, GridAreas, signed_area};
 use veduta_map::VisibilityMap;
 
 /// A map made ready to be looked up by patches.
 pub struct PatchedView<'a> {
-    view: &'a CubeView,
+    view: &'a View,
     map: &'a VisibilityMap,
+    /// What of its frame is shown.
+    region: Region,
     direction_from_image: DMat3,
-    index: FragmentIndex,
+    index: Arc<FragmentIndex>,
 }
 
 impl<'a> PatchedView<'a> {
-    /// The map that the camera of `view` sees.
-    pub fn new(view: &'a CubeView, map: &'a VisibilityMap) -> Self {
+    /// The map that the camera of `view` sees, all of it.
+    pub fn new(view: &'a View, map: &'a VisibilityMap) -> Self {
         Self {
             view,
             map,
+            region: Region::new(),
             direction_from_image: view.direction_from_image(),
-            index: FragmentIndex::new(map),
+            index: Arc::new(FragmentIndex::new(map)),
+        }
+    }
+
+    /// The same map where only a region of it is shown.
+    pub fn within(&self, region: Region) -> Self {
+        Self {
+            region,
+            index: Arc::clone(&self.index),
+            ..*self
         }
     }
 
@@ -44,7 +57,7 @@ impl<'a> PatchedView<'a> {
     }
 
     /// What sees it.
-    pub fn view(&self) -> &'a CubeView {
+    pub fn view(&self) -> &'a View {
         self.view
     }
 }
@@ -177,7 +190,7 @@ impl PatchDicer {
     ) {
         let fragment = self.near[k];
         let in_patch = &band.patches[patch as usize];
-        let polygon = self.placer.place(view.map, in_patch, looks, fragment);
+        let polygon = self.placer.place(view, in_patch, looks, fragment);
         if polygon.is_empty() {
             return;
         }
@@ -219,6 +232,25 @@ impl PatchDicer {
         );
     }
 
+    /// Area in square pixels that a view shows of a patch, whether something is seen there or not.
+    pub fn area_shown(&mut self, view: &PatchedView, patch: &Patch) -> f64 {
+        if view.region.is_empty() && view.view.sees_all_of(patch) {
+            return patch.area();
+        }
+        if view.view.touched(patch).is_none() {
+            return 0.0;
+        }
+        let frame = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(DVec2::from);
+        let looks = view.weights_from_image(patch);
+        let polygon = self
+            .placer
+            .place_polygon(&frame, &view.region, patch, looks);
+        if polygon.is_empty() {
+            return 0.0;
+        }
+        signed_area(polygon)
+    }
+
     /// What opaque faces cover of the pixels of a band, in order of pixels and faces.
     fn coverage(&mut self, view: &PatchedView, band: &PatchedBand) -> Vec<Coverage> {
         let mut rows = Vec::new();
@@ -231,7 +263,7 @@ impl PatchDicer {
                 if fragment as usize >= view.map.opaque.len() {
                     continue;
                 }
-                let polygon = self.placer.place(view.map, patch, looks, fragment);
+                let polygon = self.placer.place(view, patch, looks, fragment);
                 if polygon.is_empty() {
                     continue;
                 }
@@ -311,7 +343,7 @@ impl Ground for PatchedGround<'_> {
         let patch = &self.band.patches[patch as usize];
         let looks = self.view.weights_from_image(patch);
         let mut placer = self.placer.borrow_mut();
-        let polygon = placer.place(self.view.map, patch, looks, fragment);
+        let polygon = placer.place(self.view, patch, looks, fragment);
         let corner = self.band.corner(pixel);
         clip.clip_placed(polygon.iter().map(|&point| point - corner))
     }
@@ -356,12 +388,24 @@ impl PatchPlacer {
     /// What of a fragment lies in a patch, in pixels of the picture, positively wound; nothing if that has no area.
     fn place(
         &mut self,
-        map: &VisibilityMap,
+        view: &PatchedView,
         patch: &Patch,
         weights_from_image: DMat3,
         fragment: u32,
     ) -> &[DVec2] {
+        let map = view.map;
         let polygon = map.polygon(map.fragment(fragment as usize));
+        self.place_polygon(&polygon, &view.region, patch, weights_from_image)
+    }
+
+    /// The same for a polygon of the image plane, of which a region is shown.
+    fn place_polygon(
+        &mut self,
+        polygon: &[DVec2],
+        region: &Region,
+        patch: &Patch,
+        weights_from_image: DMat3,
+    ) -> &[DVec2] {
         let m = &weights_from_image;
         self.weights.clear();
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -376,8 +420,13 @@ impl PatchPlacer {
         }
         for side in 0..3 {
             if least[side] < 0.0 {
-                self.clip(side);
+                self.clip(|weights| weights[side], Some(side));
             }
+        }
+        for side in region {
+            // A direction is the sum of the corners', by their weights.
+            let at_corners = DVec3::from(patch.directions().map(|corner| side.dot(corner)));
+            self.clip(|weights| weights.dot(at_corners), None);
         }
         if self.weights.len() < 3 {
             return &self.polygon;
@@ -394,21 +443,27 @@ impl PatchPlacer {
         &self.polygon
     }
 
-    /// Keeps what has a weight that is not negative (Sutherland and Hodgman).
-    fn clip(&mut self, side: usize) {
+    /// Keeps that where a linear function is not negative (Sutherland and Hodgman); where it is a weight, its number
+    /// is told, since on the border it is 0 and not almost.
+    fn clip(&mut self, function: impl Fn(DVec3) -> f64, weight: Option<usize>) {
         self.clipped.clear();
         let Some(&last) = self.weights.last() else {
             return;
         };
         let mut p = last;
         for &q in &self.weights {
-            let (a, b) = (p[side], q[side]);
+            let (a, b) = (function(p), function(q));
             if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
                 // From the inner end, so that both neighbours of an edge find the same point.
-                let (inner, outer) = if a > 0.0 { (p, q) } else { (q, p) };
-                let along = inner[side] / (inner[side] - outer[side]);
-                let mut at = inner + (outer - inner) * along;
-                at[side] = 0.0;
+                let [(inner, x), (outer, y)] = if a > 0.0 {
+                    [(p, a), (q, b)]
+                } else {
+                    [(q, b), (p, a)]
+                };
+                let mut at = inner + (outer - inner) * (x / (x - y));
+                if let Some(side) = weight {
+                    at[side] = 0.0;
+                }
                 self.clipped.push(at);
             }
             if b >= 0.0 {

@@ -13,6 +13,7 @@
 //! frames of a sequence need steps 3 and 4 only. The filter is that of Greene & Heckbert (1986), in
 //! [`filter::ewa`](crate::filter::ewa).
 
+pub mod cube;
 mod lens;
 mod mapping;
 mod names;

@@ -23,7 +23,8 @@ use source::{Files, Frame, Source};
 use std::path::{Path, PathBuf};
 use target::{Aim, EYE, Made};
 use veduta::accumulate::Picture;
-use veduta_io::sphere::{Guide, Side, View, draw_guides, mask, test_card};
+use veduta::reproject::cube::{Side, Turn};
+use veduta_io::sphere::{Guide, View, draw_guides, mask, test_card};
 use veduta_io::{FileView, PictureFormat, tone};
 
 /// Make a dome, a panorama, a mirror ball or a cube of pictures of all that is around
@@ -425,7 +426,7 @@ impl Dome {
         let Some(size) = self.source.test_card else {
             return Ok(Vec::new());
         };
-        let files = Side::ALL.map(|side| (side, veduta_io::sphere::Turn::NONE, [size; 2]));
+        let files = Side::ALL.map(|side| (side, Turn::NONE, [size; 2]));
         let views = veduta_io::sphere::sides_in_files(&files, &Default::default());
         views.map_err(|(_, error)| Failure::new(Code::Usage, error.to_string()))
     }
