@@ -22,7 +22,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
-use veduta_geometry::DVec2;
+use veduta_geometry::{DVec2, DVec3};
 use veduta_map::{Camera, ObjectId, VisibilityMap};
 
 /// A part of a side of the cube, and what is seen in it.
@@ -39,8 +39,6 @@ pub struct SeenSide {
 pub struct Surroundings {
     /// In the order of the cube's sides; those that the lens does not look at are left out.
     pub sides: Vec<SeenSide>,
-    /// Patches that the lens's picture is made of.
-    pub patches: u64,
 }
 
 /// Maps of one scene, each with the view that sees it.
@@ -59,6 +57,8 @@ pub struct LensPicture {
     pub picture: Picture,
     /// Share of its area that looks where no view does, and is empty.
     pub unseen: f64,
+    /// Patches that it is made of.
+    pub patches: u64,
 }
 
 /// Finds what is seen by the lens of `projection`, whose world is that of the eye of `eye`: its right, up and, to
@@ -72,15 +72,9 @@ pub fn find_surroundings(
     mut begin: impl FnMut(Step),
 ) -> Surroundings {
     begin(Step::FollowingLens);
-    let mut patches = 0;
-    let parts = side_views(eye, |sides| {
-        let touched = parts_touched(projection, sides);
-        patches = touched.1;
-        touched.0
-    });
+    let parts = side_views(eye, |sides| parts_touched(projection, sides));
     Surroundings {
         sides: find_sides(scene, parts, begin),
-        patches,
     }
 }
 
@@ -88,7 +82,6 @@ pub fn find_surroundings(
 pub fn find_all_around(scene: &Scene, eye: &Camera, begin: impl FnMut(Step)) -> Surroundings {
     Surroundings {
         sides: find_sides(scene, whole_sides(eye).into(), begin),
-        patches: 0,
     }
 }
 
@@ -111,30 +104,38 @@ fn bands(height: u32) -> impl IndexedParallelIterator<Item = Range<u32>> {
     })
 }
 
-/// A rectangle around what is touched of each side, and the number of patches.
-type Touched = ([Option<[DVec2; 2]>; 6], u64);
+/// A rectangle around what is touched of each side.
+type Touched = [Option<[DVec2; 2]>; 6];
 
+/// What a lens touches of the sides of the cube.
+///
+/// Of what is seen in a side, the outermost lies where the lens's picture ends, or in a corner of the side: within its
+/// picture a lens sees more on every side. So the patches along the picture's border are enough.
 fn parts_touched(projection: &Projection, sides: &[View; 6]) -> Touched {
     let subdivision = Subdivision::new(projection);
     let both = |a: Option<[DVec2; 2]>, b: Option<[DVec2; 2]>| match (a, b) {
         (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
         (one, other) => one.or(other),
     };
+    let join = |a: Touched, b: Touched| std::array::from_fn(|side| both(a[side], b[side]));
     let of_bands = bands(projection.height).map_init(Vec::new, |patches: &mut Vec<Patch>, rows| {
-        subdivision.cut(rows, patches);
-        let mut touched = [None; 6];
-        for patch in &*patches {
-            for (side, touched) in sides.iter().zip(&mut touched) {
-                *touched = both(*touched, side.touched(patch));
-            }
-        }
-        (touched, patches.len() as u64)
+        subdivision.cut_border(rows, patches);
+        let of_patches = patches.iter();
+        let of_patches = of_patches.map(|patch| sides.map(|side| side.touched(patch)));
+        of_patches.fold([None; 6], join)
     });
-    let join = |a: Touched, b: Touched| {
-        let touched = std::array::from_fn(|side| both(a.0[side], b.0[side]));
-        (touched, a.1 + b.1)
+    let sees = |direction: DVec3| {
+        let world = DVec3::new(direction.x, -direction.y, -direction.z);
+        let seen = projection.image(world);
+        seen.is_some_and(|point| projection.covers(point))
     };
-    of_bands.reduce(|| ([None; 6], 0), join)
+    let corners = sides.map(|side| {
+        let corners = side.corners().into_iter().filter(|&corner| sees(corner));
+        let places = corners.map(|corner| side.homogeneous(corner));
+        let places = places.map(|place| place.truncate() / place.z);
+        places.fold(None, |box_so_far, place| both(box_so_far, Some([place; 2])))
+    });
+    join(of_bands.reduce(|| [None; 6], join), corners)
 }
 
 /// Makes the picture of `surroundings` of `scene` by the lens that they were found for.
@@ -143,10 +144,10 @@ pub fn render_surroundings(
     surroundings: &Surroundings,
     projection: &Projection,
     unlit: bool,
-) -> Picture {
+) -> LensPicture {
     let views = surroundings.sides.iter();
     let views = views.map(|seen| (seen.part.view, &seen.map)).collect();
-    render_views(&[SeenViews { scene, views }], projection, unlit).picture
+    render_views(&[SeenViews { scene, views }], projection, unlit)
 }
 
 /// Makes the picture by the lens of `projection` of what is seen in views of its eye: of each scene some.
@@ -199,10 +200,11 @@ pub fn render_views(scenes: &[SeenViews], projection: &Projection, unlit: bool) 
             *pixel = sum.map(|channel| channel as f32);
         }
         let all = patches.iter().map(|patch| patch.share * patch.area());
-        [seen, all.sum()]
+        (seen, all.sum(), patches.len() as u64)
     });
-    let areas: Vec<[f64; 2]> = areas.collect();
-    let [seen, all]: [f64; 2] = [0, 1].map(|of| areas.iter().map(|areas| areas[of]).sum());
+    let areas: Vec<(f64, f64, u64)> = areas.collect();
+    let seen: f64 = areas.iter().map(|areas| areas.0).sum();
+    let all: f64 = areas.iter().map(|areas| areas.1).sum();
     // The sums of whole pictures differ by rounding.
     let unseen = 1.0 - seen / all;
     LensPicture {
@@ -212,6 +214,7 @@ pub fn render_views(scenes: &[SeenViews], projection: &Projection, unlit: bool) 
             pixels,
         },
         unseen: if unseen > ROUNDING { unseen } else { 0.0 },
+        patches: areas.iter().map(|areas| areas.2).sum(),
     }
 }
 

@@ -282,8 +282,10 @@ impl Render {
         });
         talk.begin("shading");
         let unlit = self.look.unlit;
-        let picture = pipeline::render_surroundings(scene, &surroundings, &projection, unlit);
-        (picture, told_of(&surroundings))
+        let made = pipeline::render_surroundings(scene, &surroundings, &projection, unlit);
+        let mut told = told_of(&surroundings);
+        told["patches"] = made.patches.into();
+        (made.picture, told)
     }
 }
 
@@ -304,7 +306,6 @@ fn told_of(surroundings: &Surroundings) -> serde_json::Value {
     });
     serde_json::json!({
         "facesSeen": surroundings.faces_seen(),
-        "patches": surroundings.patches,
         "views": views.collect::<Vec<_>>(),
     })
 }

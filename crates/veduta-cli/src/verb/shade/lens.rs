@@ -96,6 +96,7 @@ impl Shade {
         let LensPicture {
             mut picture,
             unseen,
+            patches,
         } = made;
         if unseen > 0.0 {
             // Not less than 0.1 %, which would read as nothing.
@@ -115,6 +116,7 @@ impl Shade {
                 "size": [size.width, size.height],
                 "exposure": ev,
                 "lens": lens.to_string(),
+                "patches": patches,
                 "unseen": unseen,
                 "bytesRead": bytes_read,
                 "warnings": talk.warnings(),

@@ -14,16 +14,19 @@
 //!
 //! Comes in: a [`Projection`]. Goes out: the [`Patch`]es of a band of its picture. Steps:
 //!
-//! 1. `subdivide`: blocks of pixels are halved until the lens is straight enough in them, and follow the rim of
-//!    round lenses;
+//! 1. `subdivide`: `block`s of pixels are halved into `cell`s until the lens is straight enough in them, and follow the
+//!    `rim` of round lenses;
 //! 2. `patch`: a triangle with its perspective;
 //! 3. `views`: the frames through which the eye looks, any perspective cameras that stand in it; `sides`: those of a
 //!    cube around it, as far as patches look at them; `regions`: which frame shows what where several do.
 //!
 //! [`Projection`]: super::Projection
 
+mod block;
+mod cell;
 mod patch;
 mod regions;
+mod rim;
 mod sides;
 mod subdivide;
 mod views;

@@ -10,6 +10,10 @@ pub struct View {
     camera: Camera,
     /// Directions of the camera's own eye space (x right, y down, z forward) from those of the lens's eye.
     view_from_eye: DMat3,
+    /// [`Camera::image_scale`].
+    scale: DVec2,
+    /// [`Camera::principal_point`].
+    ahead: DVec2,
 }
 
 /// Why a lens does not look through a camera.
@@ -74,10 +78,16 @@ impl View {
         } else {
             turn
         };
-        Ok(Self {
-            camera: *camera,
+        Ok(Self::turned(*camera, view_from_eye))
+    }
+
+    fn turned(camera: Camera, view_from_eye: DMat3) -> Self {
+        Self {
+            camera,
             view_from_eye,
-        })
+            scale: camera.image_scale(),
+            ahead: camera.principal_point(),
+        }
     }
 
     /// The view of a frame as high and wide as it is far away, turned by `view_from_eye` from the eye of `eye`, whose
@@ -92,10 +102,7 @@ impl View {
             near: eye.near,
             shift: DVec2::ZERO,
         };
-        Self {
-            camera: whole.with_window(window),
-            view_from_eye,
-        }
+        Self::turned(whole.with_window(window), view_from_eye)
     }
 
     /// The camera.
@@ -138,13 +145,13 @@ impl View {
     #[inline(always)]
     pub fn homogeneous(&self, direction: DVec3) -> DVec3 {
         let seen = self.view_from_eye * direction;
-        let (scale, ahead) = (self.camera.image_scale(), self.camera.principal_point());
+        let (scale, ahead) = (self.scale, self.ahead);
         (seen.truncate() * scale + ahead * seen.z).extend(seen.z)
     }
 
     /// The direction of the eye at a point of the image plane as a linear function of (x, y, 1).
     pub fn direction_from_image(&self) -> DMat3 {
-        let (scale, ahead) = (self.camera.image_scale(), self.camera.principal_point());
+        let (scale, ahead) = (self.scale, self.ahead);
         let back = self.view_from_eye.transpose();
         let [x, y] = [back.x_axis / scale.x, back.y_axis / scale.y];
         DMat3::from_cols(x, y, back.z_axis - x * ahead.x - y * ahead.y)
@@ -152,7 +159,7 @@ impl View {
 
     /// A function of the image plane, times w, as a linear function of directions of the eye.
     pub fn along_directions(&self, function: &Affine) -> DVec3 {
-        let (scale, ahead) = (self.camera.image_scale(), self.camera.principal_point());
+        let (scale, ahead) = (self.scale, self.ahead);
         let DVec2 { x, y } = DVec2::new(function.a, function.b) * scale;
         let along_axis = function.a * ahead.x + function.b * ahead.y + function.c;
         self.view_from_eye.transpose() * DVec3::new(x, y, along_axis)
