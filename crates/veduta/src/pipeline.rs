@@ -16,8 +16,8 @@ mod mattes;
 pub use deep::{deep_window, render_deep};
 pub use frames::{Extent, FrameStep, FrameWork, Frames};
 pub use lens::{
-    SeenView, Surroundings, find_surroundings, lens_coverage, render_cube, render_filtered,
-    render_surroundings,
+    LensPicture, SeenSide, SeenViews, Surroundings, find_all_around, find_surroundings,
+    lens_coverage, render_cube, render_filtered, render_surroundings, render_views,
 };
 pub use local::render_region;
 

@@ -11,12 +11,14 @@ mod frame_names;
 pub mod frames;
 mod guests;
 pub mod info;
+mod lens;
 mod look;
 pub mod man;
 mod output;
 pub mod render;
 pub mod schema;
 pub mod shade;
+mod side_names;
 mod stored;
 mod vector;
 

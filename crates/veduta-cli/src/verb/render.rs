@@ -104,6 +104,8 @@ Examples:
   A dome for a planetarium from a street, and all around as a panorama:
       veduta render town.obj --lens domemaster --eye 12,-8,1.7 -o dome.png
       veduta render town.obj --lens equirect --eye 12,-8,1.7 -o around.png
+  What is seen all around, kept for pictures by any lens:
+      veduta render town.obj --lens cube --eye 12,-8,1.7 -o 't_{side}.veduta'
   Onto a photograph, through a pipe:
       veduta render town.obj --background sky.jpg -o - | cat > town.png
 ";
@@ -192,7 +194,7 @@ impl Render {
     pub fn run(&self, force: bool, json: bool, talk: &mut Talk) -> Result<(), Failure> {
         self.look.refuse_background_map()?;
         if let Some(lens) = self.lens.lens {
-            return self.render_by_lens(lens, json, talk);
+            return self.render_by_lens(lens, force, json, talk);
         }
         if let Some(target) = self.output.vector_target(&self.model, json)? {
             self.refuse_self_contained()?;

@@ -19,8 +19,8 @@ use veduta::map::{Camera, Faces, Origin, SeenScene, SeenSpans, TooFewSubScanline
 use veduta::pipeline::{self, Shortcoming};
 use veduta::scene::Scene;
 use veduta_io::{
-    MapFileError, OpenMap, Warning, change_scene, is_map, open_map, set_in_scene, write_map,
-    write_spans,
+    MapFileError, OpenMap, ReadError, Warning, change_scene, is_map, open_map, set_in_scene,
+    write_map, write_spans,
 };
 
 /// Opens a stored map; a file of another kind is refused with what to do.
@@ -149,30 +149,80 @@ impl Changes {
     /// Changes the materials: first as the file says, then as the command line does. Warns of what cannot
     /// be done; if strict, fails.
     pub fn apply(&self, scene: &mut Scene, strict: bool, talk: &mut Talk) -> Result<(), Failure> {
-        for warning in self.change(scene)? {
-            talk.warn_or_fail(warning.to_string(), strict, Code::BadInput)?;
+        self.apply_to_all(&mut [scene], strict, talk)
+    }
+
+    /// The same for the scenes of several maps, of which not each has all materials.
+    pub fn apply_to_all(
+        &self,
+        scenes: &mut [&mut Scene],
+        strict: bool,
+        talk: &mut Talk,
+    ) -> Result<(), Failure> {
+        let mut warnings = Vec::new();
+        for step in self.steps()? {
+            let mut done = Vec::new();
+            let mut refused = None;
+            for scene in &mut *scenes {
+                match step.apply(scene) {
+                    Ok(warnings) => done.push(warnings),
+                    Err(error) => refused = refused.or(Some(error)),
+                }
+            }
+            match refused {
+                Some(error) if done.is_empty() => return Err(error.into()),
+                // What one of them takes without a word is not wrong.
+                _ if done.iter().any(Vec::is_empty) => {}
+                _ => warnings.extend(done.into_iter().flatten()),
+            }
+        }
+        let mut told: Vec<String> = Vec::new();
+        for warning in warnings.iter().map(Warning::to_string) {
+            if !told.contains(&warning) {
+                talk.warn_or_fail(warning.clone(), strict, Code::BadInput)?;
+                told.push(warning);
+            }
         }
         Ok(())
     }
 
     /// The same for what casts shadows of a scene that was told all warnings.
     pub fn apply_to_casters(&self, scene: &mut Scene) -> Result<(), Failure> {
-        self.change(scene).map(|_| ())
+        for step in self.steps()? {
+            step.apply(scene)?;
+        }
+        Ok(())
     }
 
-    fn change(&self, scene: &mut Scene) -> Result<Vec<Warning>, Failure> {
-        let mut warnings = Vec::new();
+    /// What is changed one after the other.
+    fn steps(&self) -> Result<Vec<Step<'_>>, Failure> {
+        let mut steps = Vec::new();
         if let Some(path) = &self.changes {
             let text = std::fs::read(path).map_err(|error| {
                 let message = format!("{}: cannot be read: {error}", path.display());
                 Failure::new(Code::InputOutput, message)
             })?;
-            warnings.extend(change_scene(scene, path, &text)?);
+            steps.push(Step::File(path, text));
         }
-        for line in &self.set {
-            warnings.extend(set_in_scene(scene, line)?);
+        steps.extend(self.set.iter().map(|line| Step::Line(line)));
+        Ok(steps)
+    }
+}
+
+/// A step of what is changed.
+enum Step<'a> {
+    /// What a file says.
+    File(&'a Path, Vec<u8>),
+    /// What the command line does.
+    Line(&'a str),
+}
+
+impl Step<'_> {
+    fn apply(&self, scene: &mut Scene) -> Result<Vec<Warning>, ReadError> {
+        match self {
+            Self::File(path, text) => change_scene(scene, path, text),
+            Self::Line(line) => set_in_scene(scene, line),
         }
-        Ok(warnings)
     }
 }
 

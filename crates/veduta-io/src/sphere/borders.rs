@@ -5,9 +5,9 @@
 //! Mirrored pictures are not tried: a mirrored world fits together as well as the world, so that six mirrored
 //! sides are also sides of which two that face each other are exchanged.
 
-use super::side::{Side, Turn};
 use crate::tone::srgb_from_linear;
 use veduta::accumulate::Picture;
+use veduta::reproject::cube::{Side, Turn};
 
 /// How well six sides fit together as they lie, and how well they could.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,8 +4,8 @@
 //! OpenGL, by numbers. All files of a cube are named in one way, so each way is tried on all of them, the
 //! plainest first.
 
-use super::side::Side;
 use std::path::Path;
+use veduta::reproject::cube::Side;
 
 /// Words, the usual ones and those of sky boxes of games.
 const WORDS: &[(&str, Side)] = &[

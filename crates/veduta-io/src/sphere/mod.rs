@@ -1,7 +1,6 @@
 //! Pictures of the sphere around a viewer, as people and programs store them.
 //!
-//! - `side`: the sides of a cube, and the ways in which a square picture can lie; `file_names`: which side a
-//!   file shows; `layout`: where sides lie in one picture.
+//! - `file_names`: which side of a cube ([`veduta::reproject::cube`]) a file shows.
 //! - `views`: pictures of files -> views, each with what it sees where; `borders`: whether sides fit together.
 //! - `test_card`, `guides` (both of `letters`): pictures to try conventions and projectors on.
 //! - `gpano`: what photographs tell of themselves as panoramas, and [`Panorama`], what any file tells.
@@ -11,9 +10,7 @@ mod file_names;
 #[cfg(feature = "xmp")]
 mod gpano;
 mod guides;
-mod layout;
 mod letters;
-mod side;
 mod test_card;
 mod views;
 
@@ -22,12 +19,10 @@ pub use file_names::{NamesError, sides_by_names};
 #[cfg(feature = "xmp")]
 pub use gpano::{Gpano, Pose};
 pub use guides::{Guide, draw_guides, mask};
-pub use layout::{Cell, Layout, LayoutError, ShapeError, Spacing, USUAL_ORDER, sides_of, turns_of};
-pub use side::{Side, Turn};
 pub use test_card::test_card;
 pub use views::{
-    SideForm, View, ViewsError, finest_pixel, one_lens, orientation_of, side_projection,
-    sides_in_files, sides_in_layout, two_discs,
+    SideForm, View, ViewsError, finest_pixel, one_lens, side_projection, sides_in_files,
+    sides_in_layout, two_discs,
 };
 
 use veduta::reproject::Orientation;

@@ -1,11 +1,11 @@
 //! A cube to try conventions on: each side tells its name, its number, what is upwards, and its neighbours.
 
 use super::letters::{Stroke, distance, strokes};
-use super::side::Side;
 use crate::tone::linear_from_srgb;
 use rayon::prelude::*;
 use veduta::accumulate::Picture;
 use veduta::geometry::DVec2;
+use veduta::reproject::cube::Side;
 
 /// Squares along an edge.
 const SQUARES: f64 = 8.0;

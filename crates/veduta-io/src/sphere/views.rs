@@ -3,11 +3,9 @@
 //! What is planned here depends on the sizes of pictures only, so that all frames of a sequence share it.
 
 use super::Panorama;
-use super::layout::{Layout, ShapeError, Spacing};
-use super::side::{Side, Turn};
 use std::f64::consts::{FRAC_PI_2, PI};
 use veduta::accumulate::Picture;
-use veduta::geometry::DVec3;
+use veduta::reproject::cube::{Cell, Layout, ShapeError, Side, Spacing, Turn};
 use veduta::reproject::{Lens, Orientation, Projection};
 
 /// A view of the sphere, and where its picture is found.
@@ -138,14 +136,6 @@ pub enum ViewsError {
     },
 }
 
-/// The orientation of a side.
-pub fn orientation_of(side: Side) -> Orientation {
-    // From right, up and forward to x right, y up and z backward.
-    let world = |[x, y, z]: [i8; 3]| DVec3::new(f64::from(x), f64::from(y), -f64::from(z));
-    let [forward, _, up] = side.axes().map(world);
-    Orientation::looking(forward, up).expect("a side's axes are orthogonal")
-}
-
 /// What a side of `size` pixels shows.
 ///
 /// # Errors
@@ -173,7 +163,7 @@ pub fn side_projection(
             }
         }
     };
-    let projection = Projection::new(lens, orientation_of(side), size, size);
+    let projection = Projection::new(lens, side.orientation(), size, size);
     // A border needs two samples; one lies in the middle either way.
     Ok(match spacing {
         Spacing::PlaneWithBorder if size > 1 => projection.sampled_on_border(),
@@ -217,7 +207,7 @@ pub fn sides_in_layout(
     form: &SideForm,
 ) -> Result<Vec<View>, ViewsError> {
     let size = layout.cell_side(width, height)?;
-    let view = |cell: &super::Cell| {
+    let view = |cell: &Cell| {
         let (side, turn) = form.really(cell.side, cell.turn);
         Ok(View {
             name: side.name().to_owned(),
@@ -290,7 +280,7 @@ pub fn two_discs(
         file: 0,
         window: Some([column * height, 0, height, height]),
         turn: Turn::NONE,
-        projection: Projection::new(lens, orientation_of(side), height, height),
+        projection: Projection::new(lens, side.orientation(), height, height),
     };
     Ok([(left, 0), (right, 1)].map(view).into())
 }
@@ -317,6 +307,7 @@ pub fn finest_pixel(views: &[View]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use veduta::geometry::DVec3;
 
     #[test]
     fn padded_sides_see_more_than_a_quarter() {

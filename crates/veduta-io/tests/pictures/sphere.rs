@@ -4,10 +4,10 @@
 use crate::{OneFile, encoded, sample_picture};
 use veduta::accumulate::Picture;
 use veduta::geometry::{DVec2, DVec3};
+use veduta::reproject::cube::{Layout, Side, Turn};
 use veduta::reproject::{Lens, Orientation};
 use veduta_io::sphere::{
-    Gpano, Layout, Panorama, Pose, Side, SideForm, Turn, View, one_lens, sides_in_files,
-    sides_in_layout,
+    Gpano, Panorama, Pose, SideForm, View, one_lens, sides_in_files, sides_in_layout,
 };
 use veduta_io::{PictureOptions, read_linear_picture, read_picture, write_picture};
 

@@ -30,6 +30,7 @@
 mod bands;
 mod coverage;
 mod depth;
+mod fragment_index;
 mod guests;
 mod measure;
 mod patched;

@@ -9,32 +9,45 @@
 //! [`PatchedParts`], parts with the patch in which each lies.
 
 use super::coverage::summed;
+use super::fragment_index::FragmentIndex;
 use super::place::PixelClip;
 use super::veils::{Ground, VeilBuffers, attenuate_on};
 use super::{Coverage, Diced, Part, Parts, Run};
-use crate::reproject::patches::{CubeView, Patch};
-use rayon::prelude::*;
+use crate::reproject::patches::{Patch, Region, View};
 use std::cell::RefCell;
 use std::ops::Range;
+use std::sync::Arc;
 use veduta_geometry::{Affine, Cells, DMat3, DVec2, DVec3, GridAreas, signed_area};
 use veduta_map::VisibilityMap;
 
 /// A map made ready to be looked up by patches.
 pub struct PatchedView<'a> {
-    view: &'a CubeView,
+    view: &'a View,
     map: &'a VisibilityMap,
+    /// What of its frame is shown.
+    region: Region,
     direction_from_image: DMat3,
-    index: FragmentIndex,
+    index: Arc<FragmentIndex>,
 }
 
 impl<'a> PatchedView<'a> {
-    /// The map that the camera of `view` sees.
-    pub fn new(view: &'a CubeView, map: &'a VisibilityMap) -> Self {
+    /// The map that the camera of `view` sees, all of it.
+    pub fn new(view: &'a View, map: &'a VisibilityMap) -> Self {
         Self {
             view,
             map,
+            region: Region::new(),
             direction_from_image: view.direction_from_image(),
-            index: FragmentIndex::new(map),
+            index: Arc::new(FragmentIndex::new(map)),
+        }
+    }
+
+    /// The same map where only a region of it is shown.
+    pub fn within(&self, region: Region) -> Self {
+        Self {
+            region,
+            index: Arc::clone(&self.index),
+            ..*self
         }
     }
 
@@ -44,7 +57,7 @@ impl<'a> PatchedView<'a> {
     }
 
     /// What sees it.
-    pub fn view(&self) -> &'a CubeView {
+    pub fn view(&self) -> &'a View {
         self.view
     }
 }
@@ -177,7 +190,7 @@ impl PatchDicer {
     ) {
         let fragment = self.near[k];
         let in_patch = &band.patches[patch as usize];
-        let polygon = self.placer.place(view.map, in_patch, looks, fragment);
+        let polygon = self.placer.place(view, in_patch, looks, fragment);
         if polygon.is_empty() {
             return;
         }
@@ -219,6 +232,25 @@ impl PatchDicer {
         );
     }
 
+    /// Area in square pixels that a view shows of a patch, whether something is seen there or not.
+    pub fn area_shown(&mut self, view: &PatchedView, patch: &Patch) -> f64 {
+        if view.region.is_empty() && view.view.sees_all_of(patch) {
+            return patch.area();
+        }
+        if view.view.touched(patch).is_none() {
+            return 0.0;
+        }
+        let frame = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(DVec2::from);
+        let looks = view.weights_from_image(patch);
+        let polygon = self
+            .placer
+            .place_polygon(&frame, &view.region, patch, looks);
+        if polygon.is_empty() {
+            return 0.0;
+        }
+        signed_area(polygon)
+    }
+
     /// What opaque faces cover of the pixels of a band, in order of pixels and faces.
     fn coverage(&mut self, view: &PatchedView, band: &PatchedBand) -> Vec<Coverage> {
         let mut rows = Vec::new();
@@ -231,7 +263,7 @@ impl PatchDicer {
                 if fragment as usize >= view.map.opaque.len() {
                     continue;
                 }
-                let polygon = self.placer.place(view.map, patch, looks, fragment);
+                let polygon = self.placer.place(view, patch, looks, fragment);
                 if polygon.is_empty() {
                     continue;
                 }
@@ -311,7 +343,7 @@ impl Ground for PatchedGround<'_> {
         let patch = &self.band.patches[patch as usize];
         let looks = self.view.weights_from_image(patch);
         let mut placer = self.placer.borrow_mut();
-        let polygon = placer.place(self.view.map, patch, looks, fragment);
+        let polygon = placer.place(self.view, patch, looks, fragment);
         let corner = self.band.corner(pixel);
         clip.clip_placed(polygon.iter().map(|&point| point - corner))
     }
@@ -356,12 +388,24 @@ impl PatchPlacer {
     /// What of a fragment lies in a patch, in pixels of the picture, positively wound; nothing if that has no area.
     fn place(
         &mut self,
-        map: &VisibilityMap,
+        view: &PatchedView,
         patch: &Patch,
         weights_from_image: DMat3,
         fragment: u32,
     ) -> &[DVec2] {
+        let map = view.map;
         let polygon = map.polygon(map.fragment(fragment as usize));
+        self.place_polygon(&polygon, &view.region, patch, weights_from_image)
+    }
+
+    /// The same for a polygon of the image plane, of which a region is shown.
+    fn place_polygon(
+        &mut self,
+        polygon: &[DVec2],
+        region: &Region,
+        patch: &Patch,
+        weights_from_image: DMat3,
+    ) -> &[DVec2] {
         let m = &weights_from_image;
         self.weights.clear();
         let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -376,8 +420,13 @@ impl PatchPlacer {
         }
         for side in 0..3 {
             if least[side] < 0.0 {
-                self.clip(side);
+                self.clip(|weights| weights[side], Some(side));
             }
+        }
+        for side in region {
+            // A direction is the sum of the corners', by their weights.
+            let at_corners = DVec3::from(patch.directions().map(|corner| side.dot(corner)));
+            self.clip(|weights| weights.dot(at_corners), None);
         }
         if self.weights.len() < 3 {
             return &self.polygon;
@@ -394,21 +443,27 @@ impl PatchPlacer {
         &self.polygon
     }
 
-    /// Keeps what has a weight that is not negative (Sutherland and Hodgman).
-    fn clip(&mut self, side: usize) {
+    /// Keeps that where a linear function is not negative (Sutherland and Hodgman); where it is a weight, its number
+    /// is told, since on the border it is 0 and not almost.
+    fn clip(&mut self, function: impl Fn(DVec3) -> f64, weight: Option<usize>) {
         self.clipped.clear();
         let Some(&last) = self.weights.last() else {
             return;
         };
         let mut p = last;
         for &q in &self.weights {
-            let (a, b) = (p[side], q[side]);
+            let (a, b) = (function(p), function(q));
             if (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0) {
                 // From the inner end, so that both neighbours of an edge find the same point.
-                let (inner, outer) = if a > 0.0 { (p, q) } else { (q, p) };
-                let along = inner[side] / (inner[side] - outer[side]);
-                let mut at = inner + (outer - inner) * along;
-                at[side] = 0.0;
+                let [(inner, x), (outer, y)] = if a > 0.0 {
+                    [(p, a), (q, b)]
+                } else {
+                    [(q, b), (p, a)]
+                };
+                let mut at = inner + (outer - inner) * (x / (x - y));
+                if let Some(side) = weight {
+                    at[side] = 0.0;
+                }
                 self.clipped.push(at);
             }
             if b >= 0.0 {
@@ -427,80 +482,4 @@ fn rows_of(polygon: &[DVec2]) -> Range<u32> {
         (low.min(y), high.max(y))
     });
     low.max(0.0) as u32..high.ceil() as u32
-}
-
-/// Which fragments are seen where: lists for the cells of a grid over the frame.
-struct FragmentIndex {
-    side: u32,
-    /// `fragments[starts[c]..starts[c + 1]]` are seen in cell `c`, ascending.
-    starts: Vec<u32>,
-    fragments: Vec<u32>,
-}
-
-/// Bounds of the number of cells along a side of the index. Fewer would list too much for a patch, more would list
-/// large fragments too often.
-const INDEX_SIDES: [f64; 2] = [32.0, 1024.0];
-
-impl FragmentIndex {
-    fn new(map: &VisibilityMap) -> Self {
-        let count = map.fragment_count();
-        let side = (count as f64).sqrt().clamp(INDEX_SIDES[0], INDEX_SIDES[1]) as u32;
-        let mut listed: Vec<(u32, u32)> = (0..count as u32)
-            .into_par_iter()
-            .with_min_len(1024)
-            .fold(
-                || (Vec::new(), GridAreas::new(), Vec::new()),
-                |(mut listed, mut areas, mut scaled), fragment| {
-                    scaled.clear();
-                    let polygon = map.polygon(map.fragment(fragment as usize));
-                    scaled.extend(polygon.iter().map(|&p| p * f64::from(side)));
-                    areas.each_cell(&scaled, side, 0..side, |cells| match cells {
-                        Cells::Boundary { column, row, .. } => {
-                            listed.push((row * side + column, fragment));
-                        }
-                        Cells::Inside { row, columns } => {
-                            let cells = columns.map(|column| row * side + column);
-                            listed.extend(cells.map(|cell| (cell, fragment)));
-                        }
-                    });
-                    (listed, areas, scaled)
-                },
-            )
-            .map(|(listed, ..)| listed)
-            .reduce(Vec::new, |mut a, mut b| {
-                a.append(&mut b);
-                a
-            });
-        listed.par_sort_unstable();
-        let cells = side * side;
-        let mut starts = vec![0_u32; cells as usize + 1];
-        for &(cell, _) in &listed {
-            starts[cell as usize + 1] += 1;
-        }
-        for cell in 0..cells as usize {
-            starts[cell + 1] += starts[cell];
-        }
-        Self {
-            side,
-            starts,
-            fragments: listed.into_iter().map(|(_, fragment)| fragment).collect(),
-        }
-    }
-
-    /// Adds the fragments that may be seen in a rectangle of the frame, ascending.
-    fn find(&self, [min, max]: [DVec2; 2], near: &mut Vec<u32>) {
-        let last = self.side - 1;
-        let cell = |at: f64| ((at * f64::from(self.side)).max(0.0) as u32).min(last);
-        let [columns, rows] = [0, 1].map(|axis| cell(min[axis])..cell(max[axis]) + 1);
-        let is_one = columns.len() * rows.len() == 1;
-        for row in rows {
-            let first = self.starts[(row * self.side + columns.start) as usize] as usize;
-            let end = self.starts[(row * self.side + columns.end) as usize] as usize;
-            near.extend_from_slice(&self.fragments[first..end]);
-        }
-        if !is_one {
-            near.sort_unstable();
-            near.dedup();
-        }
-    }
 }

@@ -14,6 +14,7 @@
 //! [`filter::ewa`](crate::filter::ewa).
 
 mod aprons;
+pub mod cube;
 mod lens;
 mod mapping;
 mod names;

@@ -172,6 +172,24 @@ impl Projection {
         }
     }
 
+    /// Whether all pixels of a rectangle are known to be covered wholly: what is quicker to tell than each of them.
+    /// Pictures are convex, so that the corners tell.
+    pub fn fills(&self, min: DVec2, max: DVec2) -> bool {
+        if !self.lens.is_round() {
+            let centres = [min + 0.5, max - 0.5];
+            return centres
+                .iter()
+                .all(|&at| self.lens.covers(self.lens_from_image(at)));
+        }
+        let far = (min - self.centre).abs().max((max - self.centre).abs());
+        let in_disc = far.length_squared() <= self.scale.y * self.scale.y;
+        let corners = [min, DVec2::new(max.x, min.y), max, DVec2::new(min.x, max.y)];
+        in_disc
+            && corners
+                .iter()
+                .all(|&at| self.lens.covers(self.lens_from_image(at)))
+    }
+
     /// Share of the pixel around an image point in which directions are not more than 45 degrees below the axis.
     fn above_arc(&self, image: DVec2) -> f64 {
         let Some(ray) = self.lens.ray(self.lens_from_image(image)) else {

@@ -3,7 +3,8 @@
 use super::source::Frame;
 use veduta::accumulate::Picture;
 use veduta::reproject::Lens;
-use veduta_io::sphere::{Change, Side, Turn, View, fit};
+use veduta::reproject::cube::{Side, Turn};
+use veduta_io::sphere::{Change, View, fit};
 
 /// Sentences about what seems wrong with the views of a frame.
 pub fn of(views: &[View], frame: &Frame) -> Vec<String> {

@@ -7,7 +7,8 @@ use super::{Dome, GuideArgument, Run, doubts};
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use veduta::accumulate::Picture;
-use veduta_io::sphere::{Guide, Side, View, draw_guides, mask, test_card};
+use veduta::reproject::cube::{Side, Turn};
+use veduta_io::sphere::{Guide, View, draw_guides, mask, test_card};
 use veduta_io::{PictureFormat, tone};
 
 /// One eye's files, and, once the first frame is read, what they show.
@@ -123,7 +124,7 @@ impl Dome {
         let Some(size) = self.source.test_card else {
             return Ok(Vec::new());
         };
-        let files = Side::ALL.map(|side| (side, veduta_io::sphere::Turn::NONE, [size; 2]));
+        let files = Side::ALL.map(|side| (side, Turn::NONE, [size; 2]));
         let views = veduta_io::sphere::sides_in_files(&files, &Default::default());
         views.map_err(|(_, error)| Failure::new(Code::Usage, error.to_string()))
     }

@@ -9,10 +9,9 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use veduta::accumulate::Picture;
+use veduta::reproject::cube::{Layout, LayoutError, Side, Turn, sides_of, turns_of};
 use veduta::reproject::{Lens, Orientation};
-use veduta_io::sphere::{
-    self, Layout, Panorama, Side, SideForm, Turn, View, sides_by_names, sides_of, turns_of,
-};
+use veduta_io::sphere::{self, Panorama, SideForm, View, sides_by_names};
 use veduta_io::{FileView, LoadedPicture, read_linear_picture, read_picture, read_views_file};
 
 /// What the views are.
@@ -390,7 +389,7 @@ impl Source {
 
     /// Checks what can be checked before any file is read.
     pub fn check(&self) -> Result<(), Failure> {
-        let usage = |error: sphere::LayoutError| Failure::new(Code::Usage, error.to_string());
+        let usage = |error: LayoutError| Failure::new(Code::Usage, error.to_string());
         if let Some(name) = &self.layout {
             Layout::new(name, self.order.as_deref(), self.rotations.as_deref()).map_err(usage)?;
         }

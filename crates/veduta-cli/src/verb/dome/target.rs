@@ -3,14 +3,16 @@
 use crate::exit::{Code, Failure};
 use crate::values::{self, Size};
 use crate::verb::frame_names::FrameNames;
+use crate::verb::side_names;
 use clap::{Args, ValueEnum};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use veduta::accumulate::Picture;
 use veduta::geometry::DVec2;
+use veduta::reproject::cube::{Layout, Side, Spacing};
 use veduta::reproject::{Lens, Orientation, Projection};
-use veduta_io::sphere::{self, Layout, Panorama, Side, SideForm, Spacing};
+use veduta_io::sphere::{self, Panorama, SideForm};
 use veduta_io::{PictureFormat, sphere::Gpano};
 
 /// Through which lens, and where it looks.
@@ -187,7 +189,7 @@ impl Aim {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        let names_sides = SIDE_NAMES.iter().any(|(place, _)| name.contains(place));
+        let names_sides = side_names::has_place(&name);
         if !self.is_cube() {
             if self.to_layout.is_some() {
                 return usage("--to-layout is for --lens cube");
@@ -332,26 +334,6 @@ fn is_exr(format: PictureFormat) -> bool {
     format == PictureFormat::Exr
 }
 
-/// How a side is called.
-type Naming = fn(Side) -> String;
-
-/// What stands in a name for a side, and how it is called there.
-const SIDE_NAMES: [(&str, Naming); 3] = [
-    ("{side}", |side| side.name().to_owned()),
-    ("{letter}", |side| side.letter().to_string()),
-    ("{axis}", |side| {
-        let axis = match side {
-            Side::Front => "pz",
-            Side::Right => "px",
-            Side::Back => "nz",
-            Side::Left => "nx",
-            Side::Up => "py",
-            Side::Down => "ny",
-        };
-        axis.to_owned()
-    }),
-];
-
 /// What stands in a name for an eye.
 pub const EYE: &str = "{eye}";
 
@@ -363,9 +345,7 @@ pub fn file(pattern: &FrameNames<'_>, number: u32, eye: &str, side: Option<Side>
     };
     let mut name = name.replace(EYE, eye);
     if let Some(side) = side {
-        for (place, called) in SIDE_NAMES {
-            name = name.replace(place, &called(side));
-        }
+        name = side_names::named(&name, side);
     }
     path.with_file_name(name)
 }

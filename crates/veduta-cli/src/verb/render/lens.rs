@@ -3,14 +3,17 @@
 use super::{Render, View, tell_step};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
-use crate::values::{self, Size};
+use crate::values::Size;
+use crate::verb::lens::{Aim, LensArgument, side_at_parity};
+use crate::verb::side_names;
+use crate::verb::stored::{Stored, refuse_place, tell_work};
 use clap::{Args, ValueEnum};
-use std::fmt;
-use std::str::FromStr;
+use std::path::Path;
 use veduta::accumulate::Picture;
-use veduta::map::{self, Camera};
-use veduta::pipeline::{self, RenderSettings, Sampling, Surroundings};
-use veduta::reproject::{LENS_NAMES, Lens, Orientation, Projection};
+use veduta::map::{self, Camera, SeenScene};
+use veduta::pipeline::{self, Sampling, Surroundings};
+use veduta::reproject::cube::{Layout, Side};
+use veduta::reproject::{Lens, Projection};
 use veduta::scene::{Bounds, Scene};
 use veduta_geometry::{DVec2, DVec3};
 use veduta_io::Loaded;
@@ -20,28 +23,23 @@ use veduta_io::Loaded;
 #[command(next_help_heading = "Lens")]
 pub struct LensOptions {
     /// Make the picture by another lens: omnimax, domemaster[:FOV], fisheye[:FOV], equirect, cylinder, mercator,
-    /// stereographic[:FOV], ball and others, or cube for the six faces as a cross
+    /// stereographic[:FOV], ball and others, or cube for the six sides as a cross
     ///
     /// Regions stay exact under it: areas are found in the lens's own pixels, lines are bent within 1/64 of a pixel, and
-    /// there are no faces of a cube to be seen. The lens looks where the camera does, with what is up in the camera's
+    /// there are no sides of a cube to be seen. The lens looks where the camera does, with what is up in the camera's
     /// picture up in its own, so look level (--look-at as high as --eye) for a level dome. Only what the lens
     /// looks at is found. A lens has its own angle and no frame, so that --fov, --parallel and --shift are
-    /// not for it. Not made by a lens: vector pictures, .veduta, --deep, --aov, --filter, --sampling multiscan.
+    /// not for it. With {side}, {letter} or {axis} in the name of a .veduta, what is seen is kept, in a map for
+    /// each side of a cube that the lens looks at (with cube, of all six), of which veduta shade --lens makes
+    /// pictures by any lens. Not made by a lens: vector pictures, --deep, --aov, --filter, --sampling multiscan.
     #[arg(long, value_name = "LENS")]
     pub lens: Option<LensArgument>,
-    /// How a lens's picture is made: exact regions, or ewa: by ellipses from pictures of the cube's faces, softer, and
+    /// How a lens's picture is made: exact regions, or ewa: by ellipses from pictures of the cube's sides, softer, and
     /// blind to what their pixels do not show
     #[arg(long, value_name = "HOW", default_value = "exact", requires = "lens")]
     lens_filter: LensFilter,
-    /// How far the lens's axis is raised above the line of sight: 90deg for domemaster, 11deg for omnimax, else 0
-    #[arg(long, value_name = "ANGLE", value_parser = values::angle, allow_hyphen_values = true, requires = "lens")]
-    elevation: Option<f64>,
-    /// Turn the lens to the right, before it is raised
-    #[arg(long, value_name = "ANGLE", value_parser = values::angle, allow_hyphen_values = true, requires = "lens")]
-    yaw: Option<f64>,
-    /// Turn the lens clockwise around its axis, at last
-    #[arg(long, value_name = "ANGLE", value_parser = values::angle, allow_hyphen_values = true, requires = "lens")]
-    roll: Option<f64>,
+    #[command(flatten)]
+    aim: Aim,
 }
 
 /// `--lens-filter`
@@ -53,67 +51,15 @@ enum LensFilter {
     Ewa,
 }
 
-/// Pixels along a face of the cube for each pixel of the lens in the same angle, at least, where its picture is
+/// Pixels along a side of the cube for each pixel of the lens in the same angle, at least, where its picture is
 /// filtered. Less blurs; more costs time.
-const FACE_PIXELS: f64 = 2.0;
+const SIDE_PIXELS: f64 = 2.0;
 
-/// The largest face of the cube, in pixels.
-const MOST_FACE: f64 = 8192.0;
+/// The largest side of the cube, in pixels.
+const MOST_SIDE: f64 = 8192.0;
 
-/// `--lens`
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LensArgument {
-    /// A picture by one lens.
-    Lens(Lens),
-    /// The faces of a cube, as a cross of four columns and three rows.
-    Cube,
-}
-
-impl FromStr for LensArgument {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        if name == "cube" {
-            return Ok(Self::Cube);
-        }
-        match name.parse() {
-            Ok(lens) => Ok(Self::Lens(lens)),
-            Err(veduta::reproject::LensError::Unknown { .. }) => Err(format!(
-                "there is no lens of that name; there are {LENS_NAMES}, cube"
-            )),
-            Err(problem) => Err(problem.to_string()),
-        }
-    }
-}
-
-impl fmt::Display for LensArgument {
-    fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Lens(lens) => lens.fmt(formatter),
-            Self::Cube => formatter.write_str("cube"),
-        }
-    }
-}
-
-/// Columns and rows of the cross of a cube's faces.
-const CROSS: [u32; 2] = [4, 3];
-
-impl LensArgument {
-    /// The size of a picture where none is given.
-    fn usual_size(self) -> Size {
-        let aspect = match self {
-            Self::Lens(lens) => lens.aspect(),
-            Self::Cube => f64::from(CROSS[0]) / f64::from(CROSS[1]),
-        };
-        let width = if aspect > 1.5 { 2048 } else { 1024 };
-        // A cylinder that reaches almost to the poles is higher than any picture; so much of it is enough.
-        let height = (f64::from(width) / aspect).round().clamp(1.0, 65_535.0);
-        Size {
-            width,
-            height: height as u32,
-        }
-    }
-}
+/// The largest picture that a stored map is of, in pixels.
+const MOST_PIXELS: DVec2 = DVec2::splat(65_535.0);
 
 impl Render {
     /// Fails for all that no picture by a lens is made with.
@@ -122,7 +68,6 @@ impl Render {
         let is_vector = output.vector_target(&self.model, false)?.is_some();
         let not_made = [
             (is_vector, "vector pictures"),
-            (output.map_place().is_some(), "stored maps (.veduta)"),
             (self.deep, "--deep"),
             (output.has_layers(), "--aov"),
             (!self.look.is_by_area(), "--filter"),
@@ -146,19 +91,24 @@ impl Render {
                 );
                 Err(Failure::new(Code::Usage, message))
             }
-            None => self.refuse_self_contained(),
+            None => Ok(()),
         }
     }
 
-    /// Makes the picture by a lens.
+    /// Makes the picture by a lens, or stores what it looks at.
     pub(super) fn render_by_lens(
         &self,
         lens: LensArgument,
+        force: bool,
         json: bool,
         talk: &mut Talk,
     ) -> Result<(), Failure> {
         self.refuse_with_lens(lens)?;
         self.vector.refuse()?;
+        if let Some(pattern) = self.output.map_place() {
+            return self.store_by_lens(lens, pattern, force, json, talk);
+        }
+        self.refuse_self_contained()?;
         let target = self.output.target(&self.model, json)?;
         let size = self.size.unwrap_or_else(|| lens.usual_size());
         if let Some(target) = &target {
@@ -167,7 +117,7 @@ impl Render {
         if lens == LensArgument::Cube {
             refuse_no_cross(size)?;
             if self.lens.lens_filter == LensFilter::Ewa {
-                let message = "the faces of a cube are made as they are; leave --lens-filter out";
+                let message = "the sides of a cube are made as they are; leave --lens-filter out";
                 return Err(Failure::new(Code::Usage, message));
             }
         }
@@ -182,15 +132,13 @@ impl Render {
         let (picture, told_of_lens) = match lens {
             LensArgument::Lens(lens) => self.by_lens(lens, &scene, &eye, size, talk),
             LensArgument::Cube => {
-                let settings = RenderSettings {
-                    width: size.width / CROSS[0],
-                    height: size.height / CROSS[1],
-                    unlit: self.look.unlit,
-                    ..RenderSettings::default()
-                };
-                let eye = self.lens.turned(&eye);
-                let picture =
-                    pipeline::render_cube(&scene, &eye, &settings, |step| tell_step(step, talk));
+                let layout = Layout::cross();
+                let side = size.width / layout.shape()[0];
+                let eye = self.lens.aim.turned(&eye);
+                let unlit = self.look.unlit;
+                let picture = pipeline::render_cube(&scene, &eye, &layout, side, unlit, |step| {
+                    tell_step(step, talk);
+                });
                 (picture, serde_json::json!({}))
             }
         };
@@ -227,6 +175,86 @@ impl Render {
         Ok(())
     }
 
+    fn projection(&self, lens: Lens, size: Size) -> Projection {
+        let orientation = self.lens.aim.orientation(lens.usual_elevation());
+        Projection::new(lens, orientation, size.width, size.height)
+    }
+
+    /// Stores what the lens looks at: a map for each side of the cube.
+    fn store_by_lens(
+        &self,
+        lens: LensArgument,
+        pattern: &Path,
+        force: bool,
+        json: bool,
+        talk: &mut Talk,
+    ) -> Result<(), Failure> {
+        let usage = |message: &str| Err(Failure::new(Code::Usage, message));
+        let name = pattern.file_name().unwrap_or_default().to_string_lossy();
+        if !side_names::has_place(&name) {
+            return usage(
+                "a lens looks at several sides of a cube, each kept in a map: put {side} into the name, such as \
+                 -o 'hall_{side}.veduta'",
+            );
+        }
+        if self.output.preview.is_some() || self.lens.lens_filter == LensFilter::Ewa {
+            return usage(
+                "a map is of no picture: --preview and --lens-filter are not for .veduta",
+            );
+        }
+        let place = |side: Side| pattern.with_file_name(side_names::named(&name, side));
+        for side in Side::ALL {
+            refuse_place(&place(side), force)?;
+        }
+        let size = self.size.unwrap_or_else(|| lens.usual_size());
+        let loaded = self.load(talk)?;
+        let eye = self.view.eye_of_lens(self, &loaded, size)?;
+        let mut scene = loaded.scene;
+        self.keep_layers(&mut scene)?;
+        let begin = |step| tell_step(step, talk);
+        let (surroundings, side) = match lens {
+            LensArgument::Lens(lens) => {
+                let projection = self.projection(lens, size);
+                let found = pipeline::find_surroundings(&scene, &eye, &projection, begin);
+                (found, side_at_parity(&projection))
+            }
+            LensArgument::Cube => {
+                refuse_no_cross(size)?;
+                let eye = self.lens.aim.turned(&eye);
+                let side = f64::from(size.width / Layout::cross().shape()[0]);
+                (pipeline::find_all_around(&scene, &eye, begin), side)
+            }
+        };
+        talk.begin("writing");
+        let mut told = told_of(&surroundings);
+        told["output"] = surroundings
+            .sides
+            .iter()
+            .map(|seen| serde_json::json!(place(seen.part.side).to_string_lossy()))
+            .collect();
+        told["lens"] = lens.to_string().into();
+        told["faces"] = scene.face_count().into();
+        let seen = surroundings.sides.iter().map(|seen| {
+            let [min, max] = seen.part.window;
+            // So that a picture of the map is as fine as the lens's.
+            let pixels = (side * (max - min)).round().clamp(DVec2::ONE, MOST_PIXELS);
+            let size = [pixels.x as u32, pixels.y as u32];
+            (seen.part.side, SeenScene::of(&scene, &seen.map, size))
+        });
+        let seen: Vec<(Side, SeenScene)> = seen.collect();
+        let origin = self.origin(scene, loaded.files);
+        for (side, seen) in seen {
+            Stored::Regions(seen).write(&place(side), &origin)?;
+        }
+        talk.end();
+        if json {
+            told["warnings"] = talk.warnings().into();
+            tell_work(&mut told);
+            print(&format!("{told}\n"))?;
+        }
+        Ok(())
+    }
+
     /// The picture, and what is told of how it was made.
     fn by_lens(
         &self,
@@ -236,18 +264,17 @@ impl Render {
         size: Size,
         talk: &mut Talk,
     ) -> (Picture, serde_json::Value) {
-        let orientation = self.lens.orientation(lens.usual_elevation());
-        let projection = Projection::new(lens, orientation, size.width, size.height);
+        let projection = self.projection(lens, size);
         if self.lens.lens_filter == LensFilter::Ewa {
-            let side = face_side(&projection);
+            let side = filtered_side(&projection);
             let unlit = self.look.unlit;
             let begin = |step| tell_step(step, talk);
-            let (picture, faces) =
+            let (picture, sides) =
                 pipeline::render_filtered(scene, eye, &projection, side, unlit, begin);
-            let faces: Vec<&str> = faces.into_iter().map(|face| face.name()).collect();
+            let sides: Vec<&str> = sides.into_iter().map(|side| side.name()).collect();
             return (
                 picture,
-                serde_json::json!({ "faceSide": side, "views": faces }),
+                serde_json::json!({ "sidePixels": side, "views": sides }),
             );
         }
         let surroundings = pipeline::find_surroundings(scene, eye, &projection, |step| {
@@ -255,78 +282,48 @@ impl Render {
         });
         talk.begin("shading");
         let unlit = self.look.unlit;
-        let picture = pipeline::render_surroundings(scene, &surroundings, &projection, unlit);
-        (picture, told_of(&surroundings))
+        let made = pipeline::render_surroundings(scene, &surroundings, &projection, unlit);
+        let mut told = told_of(&surroundings);
+        told["patches"] = made.patches.into();
+        (made.picture, told)
     }
 }
 
-/// Pixels along the side of the cube's faces from which a picture is filtered: by the lens's scale at its middle, where
-/// round lenses show most.
-fn face_side(projection: &Projection) -> u32 {
-    let middle = projection.image_from_lens(DVec2::ZERO);
-    let per_pixel = projection
-        .ray(middle)
-        .map_or(DVec3::ONE, |ray| ray.derivatives[1])
-        .length();
-    // A face is two radians wide by the scale of its own middle, where it shows least.
-    let side = (FACE_PIXELS * 2.0 / per_pixel).min(MOST_FACE);
+/// Pixels along the side of the cube's sides from which a picture is filtered.
+fn filtered_side(projection: &Projection) -> u32 {
+    let side = (SIDE_PIXELS * side_at_parity(projection)).min(MOST_SIDE);
     (side as u32).next_multiple_of(64)
 }
 
 fn told_of(surroundings: &Surroundings) -> serde_json::Value {
-    let views = surroundings.views.iter().map(|seen| {
-        let [min, max] = seen.view.window;
+    let views = surroundings.sides.iter().map(|seen| {
+        let [min, max] = seen.part.window;
         serde_json::json!({
-            "face": seen.view.face.name(),
+            "side": seen.part.side.name(),
             "window": [min.x, min.y, max.x, max.y],
             "fragments": seen.map.fragment_count(),
         })
     });
     serde_json::json!({
         "facesSeen": surroundings.faces_seen(),
-        "patches": surroundings.patches,
         "views": views.collect::<Vec<_>>(),
     })
 }
 
 /// Fails if a picture of that size has no cross of square faces.
 fn refuse_no_cross(size: Size) -> Result<(), Failure> {
-    let side = size.width / CROSS[0];
-    if side > 0 && [size.width, size.height] == CROSS.map(|sides| sides * side) {
+    let cross = Layout::cross();
+    if cross.cell_side(size.width, size.height).is_ok() {
         return Ok(());
     }
-    let side = side.max(1);
+    let [columns, rows] = cross.shape();
+    let side = (size.width / columns).max(1);
     let message = format!(
-        "a cube's faces lie in {} columns and {} rows of squares, so that its size is {}x{}, for one",
-        CROSS[0],
-        CROSS[1],
-        CROSS[0] * side,
-        CROSS[1] * side
+        "a cube's sides lie in {columns} columns and {rows} rows of squares, so that its size is {}x{}, for one",
+        columns * side,
+        rows * side
     );
     Err(Failure::new(Code::Usage, message))
-}
-
-impl LensOptions {
-    /// How the lens is turned with respect to the line of sight.
-    fn orientation(&self, usual_elevation: f64) -> Orientation {
-        let elevation = self.elevation.unwrap_or(usual_elevation);
-        Orientation::from_angles(self.yaw.unwrap_or(0.0), elevation, self.roll.unwrap_or(0.0))
-    }
-
-    /// The eye turned as the lens is.
-    fn turned(&self, eye: &Camera) -> Camera {
-        let orientation = self.orientation(0.0);
-        let (right, up) = (orientation.right(), orientation.up());
-        let forward = orientation.forward();
-        // From right, up, backward to right, down, forward.
-        let rows = [right, -up, forward].map(|axis| DVec3::new(axis.x, -axis.y, -axis.z));
-        let turn = veduta_geometry::DMat3::from_cols_array_2d(&rows.map(|row| row.to_array()));
-        Camera {
-            eye_from_world: veduta_geometry::DMat4::from_mat3(turn.transpose())
-                * eye.eye_from_world,
-            ..*eye
-        }
-    }
 }
 
 impl View {

@@ -54,8 +54,8 @@ impl Shade {
         self.look
             .refuse_filter("a filter reaches beyond the pixels that are made again")?;
         talk.begin("reading");
-        let mut map = open(&self.map)?;
-        refuse_spans(&self.map, &map)?;
+        let mut map = open(self.map())?;
+        refuse_spans(self.map(), &map)?;
         let frame = self.frame(map.reader().size());
         let size = whole_size(frame)?;
         target.refuse_size(size)?;
@@ -89,7 +89,7 @@ impl Shade {
             return Err(usage(message));
         }
         let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
-        tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
+        tell_shortcomings(self.map(), &seen.scene, &shortcomings, self.strict, talk)?;
         talk.begin("shading");
         blend(
             &seen,
@@ -197,7 +197,7 @@ impl Shade {
 }
 
 /// Refuses a map of spans, which have no exact pixels.
-fn refuse_spans(path: &Path, map: &OpenMap) -> Result<(), Failure> {
+pub(super) fn refuse_spans(path: &Path, map: &OpenMap) -> Result<(), Failure> {
     if map.reader().sub_scanlines_per_row().is_none() {
         return Ok(());
     }

@@ -1,6 +1,7 @@
 //! `veduta shade`: pixels of a stored map, at any scale and in other colours.
 
 mod into;
+mod lens;
 
 use super::look::Look;
 use super::output::{Output, Target};
@@ -12,8 +13,9 @@ use crate::talk::{Talk, print};
 use crate::values::{self, Size};
 use clap::Args;
 use into::Into;
+use lens::LensOptions;
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use veduta::dice::PixelGrid;
 use veduta::drawing::LineKind;
 use veduta::pipeline;
@@ -27,8 +29,9 @@ use veduta_io::Layers;
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Shade {
-    /// The map: .veduta
-    map: PathBuf,
+    /// The map: .veduta; with --lens any number of them, of one eye
+    #[arg(required = true, value_name = "MAP")]
+    maps: Vec<PathBuf>,
     /// Size of the whole picture in pixels; that of the map by default
     #[arg(long, value_name = "WxH", conflicts_with = "scale")]
     size: Option<Size>,
@@ -50,6 +53,8 @@ pub struct Shade {
     #[arg(long)]
     strict: bool,
 
+    #[command(flatten)]
+    lens: LensOptions,
     #[command(flatten)]
     local: Into,
     #[command(flatten)]
@@ -81,18 +86,38 @@ Examples:
       veduta shade near.veduta --background far.veduta -o before.png
   For deep compositing, all that is seen in each pixel:
       veduta shade town.veduta -o town-deep.exr --deep
+  By a lens, of maps of all that is around an eye:
+      veduta render town.obj --lens cube --eye 12,-8,1.7 -o 's_{side}.veduta'
+      veduta shade s_*.veduta --lens domemaster -o dome.png
+      veduta shade s_*.veduta --lens equirect --yaw 90deg -o around.png
   With what was red in another colour:
       veduta shade town.veduta --set 'material.\"red\".color=#446' -o slate.png
 ";
 
 impl Shade {
+    /// The map that is shown where there is no lens.
+    fn map(&self) -> &Path {
+        &self.maps[0]
+    }
+
     pub fn run(&self, json: bool, talk: &mut Talk) -> Result<(), Failure> {
+        if let Some(lens) = self.lens.lens {
+            return self.run_by_lens(lens, json, talk);
+        }
+        if let [_, second, ..] = self.maps.as_slice() {
+            let message = format!(
+                "{}: one map is shown at a time, several by a lens (--lens); veduta composite lays maps of one \
+                 camera over one another",
+                second.display()
+            );
+            return Err(Failure::new(Code::Usage, message));
+        }
         if self.window.is_some() && self.output.has_numbers() {
             let message = "numbers of objects, materials and faces are those of a whole map; leave \
                 --window out, or ask for --aov crypto-object";
             return Err(Failure::new(Code::Usage, message));
         }
-        let vector = match self.output.vector_target(&self.map, json)? {
+        let vector = match self.output.vector_target(self.map(), json)? {
             Some(target) => {
                 self.look.refuse_filter("a vector picture has no pixels")?;
                 let settings = self.vector.drawing(target.format)?;
@@ -115,7 +140,7 @@ impl Shade {
         };
         let pixels = match vector {
             Some(_) => None,
-            None => self.output.target(&self.map, json)?,
+            None => self.output.target(self.map(), json)?,
         };
         let deep = match &pixels {
             Some(target) if self.deep => {
@@ -144,7 +169,7 @@ impl Shade {
             return Err(Failure::new(Code::Usage, message));
         }
         talk.begin("reading");
-        let mut map = open(&self.map)?;
+        let mut map = open(self.map())?;
         let grid = self.grid(map.reader().size())?;
         if let Some(target) = &pixels {
             let [width, height] = [grid.width, grid.height];
@@ -168,7 +193,7 @@ impl Shade {
                 if !seen.guests.is_empty() && (vector.is_some() || self.deep) {
                     let message = format!(
                         "{}: holds pictures of other programs, which are laid into flat pixels only",
-                        self.map.display()
+                        self.map().display()
                     );
                     return Err(Failure::new(Code::Unsupported, message));
                 }
@@ -178,7 +203,7 @@ impl Shade {
                 let message = format!(
                     "{}: holds spans on sub-scanlines; vector and deep pictures are made of regions, \
                      which veduta render finds without --sampling",
-                    self.map.display()
+                    self.map().display()
                 );
                 return Err(Failure::new(Code::Usage, message));
             }
@@ -194,7 +219,7 @@ impl Shade {
             (Stored::Regions(seen), Some((target, settings)), ..) => {
                 let development = self.look.development(&seen.scene, self.strict, talk)?;
                 let subject = Subject {
-                    file: &self.map,
+                    file: self.map(),
                     scene: &seen.scene,
                     map: &seen.map,
                     grid: &grid,
@@ -206,7 +231,7 @@ impl Shade {
             }
             (Stored::Regions(seen), _, Some(target), _) => {
                 let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
-                tell_shortcomings(&self.map, &seen.scene, &shortcomings, self.strict, talk)?;
+                tell_shortcomings(self.map(), &seen.scene, &shortcomings, self.strict, talk)?;
                 talk.begin("shading");
                 let camera = seen.map.camera.with_window(window(&grid));
                 let size = [grid.width, grid.height];
@@ -259,16 +284,16 @@ impl Shade {
         let development = self.look.development(scene, self.strict, talk)?;
         talk.begin("shading");
         let shortcomings = seen.shortcomings();
-        tell_shortcomings(&self.map, scene, &shortcomings, self.strict, talk)?;
+        tell_shortcomings(self.map(), scene, &shortcomings, self.strict, talk)?;
         if matches!(seen, Stored::Spans(_)) {
             self.look
                 .refuse_filter("filters weigh exact regions, not spans")?;
         }
-        refuse_filter_of_guests(&self.map, seen, &self.look)?;
+        refuse_filter_of_guests(self.map(), seen, &self.look)?;
         let (aovs, filter) = (self.output.aovs(), self.look.filter());
         let picture = seen.picture(grid, self.look.unlit, filter, aovs);
         let (mut picture, aovs) = picture.map_err(|error| {
-            let message = format!("{}: {error}", self.map.display());
+            let message = format!("{}: {error}", self.map().display());
             Failure::new(Code::Usage, message)
         })?;
         let layers = Layers {
@@ -277,7 +302,7 @@ impl Shade {
             camera: seen.camera(),
             grid: *grid,
         };
-        tell_of_mattes(&self.map, &layers, self.strict, talk)?;
+        tell_of_mattes(self.map(), &layers, self.strict, talk)?;
         talk.begin("developing");
         let ev = development.develop(&mut picture, !target.linear);
         talk.begin("writing");

@@ -10,11 +10,12 @@ use super::value::{
     Angle, Circle, Direction, FieldOfView, FilePath, Flag, LensName, Quarters, Shift,
 };
 use crate::read::error::{Place, Problem, ReadError};
-use crate::sphere::{Turn, View};
+use crate::sphere::View;
 use serde_json::{Value, json};
 use std::f64::consts::FRAC_PI_2;
 use std::path::{Path, PathBuf};
 use veduta::geometry::{DVec2, DVec3};
+use veduta::reproject::cube::Turn;
 use veduta::reproject::{Lens, Orientation, Projection, dome_from_scene};
 
 table! {

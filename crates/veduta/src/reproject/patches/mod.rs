@@ -8,25 +8,31 @@
 //!
 //! Two things come for nothing. Patches partition the *picture*, and a patch that looks at what a map covers is
 //! covered wholly: no gap can open between two patches, whatever their sizes, nor in a pole, where a row of pixels
-//! sees a single direction. And a patch mixes directions, not points of any view: where it looks at two faces of a
+//! sees a single direction. And a patch mixes directions, not points of any view: where it looks at two sides of a
 //! cube, what the one shows ends in the very line in which the other begins, since directions on the border
-//! between faces are the same numbers in both. So there are no seams to hide.
+//! between sides are the same numbers in both. So there are no seams to hide.
 //!
 //! Comes in: a [`Projection`]. Goes out: the [`Patch`]es of a band of its picture. Steps:
 //!
-//! 1. `subdivide`: blocks of pixels are halved until the lens is straight enough in them, and follow the rim of
-//!    round lenses;
+//! 1. `subdivide`: `block`s of pixels are halved into `cell`s until the lens is straight enough in them, and follow the
+//!    `rim` of round lenses;
 //! 2. `patch`: a triangle with its perspective;
-//! 3. `views`: which parts of the faces of a cube around the eye the patches look at, and the [`Camera`]s that see
-//!    them.
+//! 3. `views`: the frames through which the eye looks, any perspective cameras that stand in it; `sides`: those of a
+//!    cube around it, as far as patches look at them; `regions`: which frame shows what where several do.
 //!
-//! [`Camera`]: veduta_map::Camera
 //! [`Projection`]: super::Projection
 
+mod block;
+mod cell;
 mod patch;
+mod regions;
+mod rim;
+mod sides;
 mod subdivide;
 mod views;
 
 pub use patch::Patch;
+pub use regions::{Region, regions};
+pub use sides::{SideView, side_views};
 pub use subdivide::{Subdivision, TOLERANCE};
-pub use views::{CubeFace, CubeView, cube_views};
+pub use views::{View, ViewError};

@@ -2,8 +2,9 @@ use veduta_geometry::{DMat3, DVec2, DVec3, cross};
 
 /// A triangle of a picture, with the perspective by which it is seen.
 ///
-/// A point of it with barycentric coordinates `w` sees the direction `Σ w_i d_i`, with `d_i` the unit directions of
-/// the corners: a perspective picture, whose camera looks at the triangle askew. Directions are in eye space (x
+/// A point of it with barycentric coordinates `w` sees the direction `Σ w_i d_i`, with `d_i` the directions of
+/// the corners: a perspective picture, whose camera looks at the triangle askew. Their lengths tell how directions are
+/// spaced between the corners. Directions are in eye space (x
 /// right, y down, z forward) of the eye that stands in the middle of the picture's world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patch {
@@ -22,7 +23,53 @@ pub struct Patch {
 /// line. Larger would move the picture near poles; smaller would leave only rounding of the directions.
 const LEAST_SPAN: f64 = 1e-9;
 
+/// The most by which lengths of directions differ in a patch, as a logarithm. Larger would do no good; without bounds, a
+/// corner at a pole would have none.
+const MOST_UNEVEN: f64 = 2.0;
+
 impl Patch {
+    /// The triangle with these corners, positively wound, and their unit directions, spaced so that it sees
+    /// `middles` near the middles of its sides, in the order of the corners that they follow. `None` as of
+    /// [`Patch::new`].
+    ///
+    /// With directions of one length, what is seen in the middle of a side is shown nearer to one of its ends, as if that
+    /// end's direction were too short for it. Three sides ask for more than three lengths can give: what is left goes
+    /// to short sides, where it moves least.
+    pub fn through(
+        corners: [DVec2; 3],
+        directions: [DVec3; 3],
+        middles: [DVec3; 3],
+    ) -> Option<Self> {
+        let plain = Self::new(corners, directions)?;
+        let mut wanted = [0.0; 3];
+        let mut give = [0.0; 3];
+        for k in 0..3 {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            let side = b - a;
+            let shown = plain.point(plain.weights(middles[k]));
+            // Along the side, from its middle; what is off across it no length helps.
+            let along = (shown - 0.5 * (a + b)).dot(side) / side.length_squared();
+            // The logarithm of the ratio of lengths that moves it back.
+            let ratio = ((0.5 + along) / (0.5 - along)).ln();
+            wanted[k] = if ratio.is_finite() { ratio } else { 0.0 };
+            give[k] = side.length_squared().recip();
+        }
+        let left = wanted.iter().sum::<f64>() / give.iter().sum::<f64>();
+        let step = |k: usize| (wanted[k] - left * give[k]).clamp(-MOST_UNEVEN, MOST_UNEVEN);
+        Some(plain.with_lengths([1.0, step(0).exp(), (-step(2)).exp()]))
+    }
+
+    /// The same triangle with directions of these lengths.
+    fn with_lengths(self, [l0, l1, l2]: [f64; 3]) -> Self {
+        let [d0, d1, d2] = self.directions();
+        let lengths = DMat3::from_diagonal(DVec3::new(l0.recip(), l1.recip(), l2.recip()));
+        Self {
+            directions: DMat3::from_cols(d0 * l0, d1 * l1, d2 * l2),
+            weights_from_direction: lengths * self.weights_from_direction,
+            ..self
+        }
+    }
+
     /// The triangle with these corners, positively wound, and their unit directions. `None` where the directions lie
     /// on a great circle, as at a pole: nothing has an extent there.
     pub fn new(corners: [DVec2; 3], directions: [DVec3; 3]) -> Option<Self> {
@@ -52,7 +99,7 @@ impl Patch {
         &self.corners
     }
 
-    /// Directions of the corners.
+    /// Directions of the corners, of lengths that space what is between them.
     pub fn directions(&self) -> [DVec3; 3] {
         let columns = &self.directions;
         [columns.x_axis, columns.y_axis, columns.z_axis]

@@ -1,9 +1,9 @@
 //! Where the sides of a cube lie in one picture: strips, crosses, and those of video and OpenEXR.
 
-use super::side::{Side, Turn};
+use super::{Side, Turn};
+use crate::accumulate::Picture;
 use std::fmt;
 use std::str::FromStr;
-use veduta::accumulate::Picture;
 
 /// Where the sides of a cube lie in one picture, a grid of square cells.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -193,6 +193,11 @@ impl Layout {
             cells,
             spacing,
         })
+    }
+
+    /// The cross of four columns and three rows, as seen from inside.
+    pub fn cross() -> Self {
+        Self::new("cross", None, None).expect("one of the names")
     }
 
     /// The layout that a picture of that shape most likely has: a strip, or a cross.
