@@ -37,8 +37,11 @@ const BLOCKS_AT_ONCE: usize = 64;
 struct Channel<'a> {
     name: String,
     sample_type: SampleType,
-    append: Box<dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a>,
+    append: Box<Append<'a>>,
 }
+
+/// Appends the samples of pixels to bytes.
+type Append<'a> = dyn Fn(Range<usize>, &mut Vec<u8>) + Sync + 'a;
 
 impl<'a> Channel<'a> {
     /// A channel that is stored like the picture's light.
