@@ -238,6 +238,9 @@ fn lines_behind_many_faces_are_left_out_if_told() {
             most_before,
             ..settings()
         };
-        assert_lengths("behind", &drawn(&scene, &settings), [800.0, 0.0, hidden]);
+        let drawing = drawn(&scene, &settings);
+        assert_lengths("behind", &drawing, [800.0, 0.0, hidden]);
+        // And in one piece, whatever there is before them.
+        assert_eq!(drawing.strokes.len(), 1 + most_before);
     }
 }

@@ -98,8 +98,8 @@ pub(super) fn segments(
                 segments.extend(seen.map(|part| (edge.kind, edge.part(part))));
             }
             if has_hidden {
-                let drawn = hidden.iter().filter(|hidden| hidden.before <= most_before);
-                segments.extend(drawn.map(|hidden| (LineKind::Hidden, edge.part(hidden.part))));
+                let drawn = joined(hidden.iter().filter(|hidden| hidden.before <= most_before));
+                segments.extend(drawn.map(|part| (LineKind::Hidden, edge.part(part))));
             }
             segments
         })
@@ -312,6 +312,18 @@ fn hidden_parts(map: &VisibilityMap, edge: &Edge, near: &[u32]) -> Vec<Hidden> {
         last.part[1] = 1.0;
     }
     parts
+}
+
+/// Parts in order, those that touch in one.
+fn joined<'a>(parts: impl Iterator<Item = &'a Hidden>) -> impl Iterator<Item = [f64; 2]> {
+    let mut joined: Vec<[f64; 2]> = Vec::new();
+    for &Hidden { part, .. } in parts {
+        match joined.last_mut() {
+            Some(last) if last[1] == part[0] => last[1] = part[1],
+            _ => joined.push(part),
+        }
+    }
+    joined.into_iter()
 }
 
 /// The parts of an edge of that length between hidden ones.
