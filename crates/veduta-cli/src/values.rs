@@ -260,7 +260,7 @@ pub fn color(text: &str) -> Result<[f32; 3], String> {
 }
 
 /// Pixels of a millimetre, at the 96 to an inch of CSS.
-const PIXELS_PER_MM: f64 = 96.0 / 25.4;
+pub const PIXELS_PER_MM: f64 = 96.0 / 25.4;
 
 /// Width of a line in pixels: `0.5px`, `0.35mm`, or a number of pixels.
 pub fn line_width(text: &str) -> Result<f64, String> {
@@ -271,6 +271,15 @@ pub fn line_width(text: &str) -> Result<f64, String> {
     match number.trim().parse::<f64>() {
         Ok(width) if width > 0.0 && width <= 1000.0 => Ok(width * unit),
         _ => Err("expected a width above 0 and up to 1000, such as 0.5px or 0.35mm".into()),
+    }
+}
+
+/// How near lines may come to one another, in pixels.
+pub fn spacing(text: &str) -> Result<f64, String> {
+    match text.strip_suffix("px").unwrap_or(text).trim() {
+        "0" => Ok(0.0),
+        _ => line_width(text)
+            .map_err(|_| "expected a distance from 0 to 1000, such as 2px or 0.5mm".into()),
     }
 }
 

@@ -91,5 +91,6 @@ pub use write::{
 pub use write::{Layers, stream_layers, write_layers};
 #[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
 pub use write::{
-    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
+    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, hidden_dash, stream_drawing,
+    write_drawing,
 };

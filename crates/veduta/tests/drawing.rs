@@ -817,6 +817,48 @@ fn no_background_is_seen_between_neighbours() {
 }
 
 #[test]
+fn a_trap_ends_before_what_is_painted_earlier_beyond_a_sliver() {
+    // A trap went on beyond a sliver thinner than rounding: its far side was taken for the zone's border.
+    let sides = [-0.3, -1e-10, 0.0, 1.0];
+    let strip = |k: usize| {
+        let [left, right] = [sides[k], sides[k + 1]];
+        let corners = [[left, -1.0], [right, -1.0], [right, 1.0], [left, 1.0]];
+        upright(0.0, &corners, &[[0, 1, 2], [0, 2, 3]])
+    };
+    let mut scene = scene_of(vec![("a", strip(0)), ("b", strip(1)), ("c", strip(2))]);
+    scene
+        .objects
+        .iter_mut()
+        .for_each(|object| object.name = "strips".to_owned());
+    scene.materials = [
+        [0.9, 0.1, 0.1, 1.0],
+        [0.1, 0.9, 0.1, 1.0],
+        [0.1, 0.1, 0.9, 1.0],
+    ]
+    .map(|base_color| Material {
+        base_color,
+        unlit: true,
+        ..Material::default()
+    })
+    .to_vec();
+    for (index, mesh) in scene.meshes.iter_mut().enumerate() {
+        mesh.materials = vec![(0, MaterialId(index as u32))];
+    }
+    let drawing = drawn(&scene, &view_from(-DVec3::Y), &Settings::default());
+    let extent = |material: u32| {
+        let shapes = drawing.shapes.iter();
+        let mut own = shapes.filter(|shape| shape.material == MaterialId(material));
+        let points = own.next().expect("a shape").painted.iter().flatten();
+        let of_x = points.map(|point| point.x);
+        of_x.fold([f64::INFINITY, 0.0], |[low, high], x| {
+            [low.min(x), high.max(x)]
+        })
+    };
+    assert!(extent(0)[1] > 201.0, "a trap under what is painted later");
+    assert!(extent(2)[0] > 199.999, "{}", extent(2)[0]);
+}
+
+#[test]
 fn what_fills_the_frame_has_no_outline() {
     let square = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]];
     let wall = upright(0.0, &square, &[[0, 1, 2], [0, 2, 3]]);

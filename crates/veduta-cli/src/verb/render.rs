@@ -31,7 +31,8 @@ use veduta_io::{Layers, Loaded, reading_of, scaled};
 ///
 /// Vector pictures (.svg, .pdf, .geojson) have one shape for neighbouring faces in one plane that look
 /// alike, named as their objects are, with --trap against seams between them. A shape has one colour: the mean, where it has a
-/// texture, smooth normals or colours at its corners. Lines are visible edges; hidden ones are not drawn.
+/// texture, smooth normals or colours at its corners. Lines are visible edges, those of
+/// transparent faces too, which hide no line; hidden ones are dashed, if they are asked for.
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES)]
 pub struct Render {
@@ -94,6 +95,8 @@ Examples:
       veduta render town.obj -o town.exr --aov depth,normal,crypto-object
   A drawing for print, with lines of a quarter of a millimetre:
       veduta render town.obj -o town.pdf --lines crease --line-width 0.25mm
+  A machine with what lies behind its outer walls dashed:
+      veduta render town.obj -o b.svg --lines crease,hidden --hidden-behind 1
   A moment of what moves:
       veduta render voyage.toml --frame 36 -o a.png
   Lines only, for an illustration:

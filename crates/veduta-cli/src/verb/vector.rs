@@ -16,7 +16,9 @@ use veduta::drawing::{self, Drawing, Evenness, Joining, LineKind};
 use veduta::map::VisibilityMap;
 use veduta::pipeline;
 use veduta::scene::Scene;
-use veduta_io::{VectorFormat, VectorOptions, WriteProblem, stream_drawing, write_drawing};
+use veduta_io::{
+    VectorFormat, VectorOptions, WriteProblem, hidden_dash, stream_drawing, write_drawing,
+};
 
 /// What a vector picture shows.
 ///
@@ -41,6 +43,14 @@ pub struct Vector {
     /// smoothly, by equal normals on both sides, are none
     #[arg(long, value_name = "ANGLE", value_parser = values::crease_angle)]
     crease_angle: Option<f64>,
+    /// How near hidden lines may come to lines beside them, such as 2px or 0.5mm; parts that come nearer, and hidden
+    /// lines shorter than a dash, are left out. 0.7mm by default; 0 draws all
+    #[arg(long, value_name = "DISTANCE", value_parser = values::spacing)]
+    hidden_spacing: Option<f64>,
+    /// Draw hidden lines only behind at most this many faces: 1 for the far sides of what is seen, 2 for
+    /// what is in it; all by default
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    hidden_behind: Option<u32>,
     /// How far shapes reach under those on top of them, in pixels, so that viewers show no seams; 2 by
     /// default, enough to view the picture at its size or larger. 0 for outlines as they are seen
     #[arg(long, value_name = "PIXELS", value_parser = values::trap)]
@@ -79,6 +89,8 @@ impl Vector {
             (self.line_width.is_some(), "--line-width"),
             (self.line_color.is_some(), "--line-color"),
             (self.crease_angle.is_some(), "--crease-angle"),
+            (self.hidden_spacing.is_some(), "--hidden-spacing"),
+            (self.hidden_behind.is_some(), "--hidden-behind"),
             (self.trap.is_some(), "--trap"),
             (self.decimals.is_some(), "--decimals"),
         ];
@@ -116,7 +128,22 @@ impl Vector {
                 "--trap is for .svg and .pdf: shapes of .geojson end where they are seen to",
             );
         }
+        let of_hidden = [
+            (self.hidden_spacing.is_some(), "--hidden-spacing"),
+            (self.hidden_behind.is_some(), "--hidden-behind"),
+        ];
+        if let Some((_, option)) = of_hidden.into_iter().find(|(is_given, _)| *is_given)
+            && !self.lines.contains(&Line::Hidden)
+        {
+            return usage(&format!(
+                "{option} is for hidden lines: --lines silhouette,crease,hidden"
+            ));
+        }
         let usual = drawing::Settings::default();
+        let hidden_spacing = self.hidden_spacing.unwrap_or(HIDDEN_SPACING);
+        let line_width = self
+            .line_width
+            .unwrap_or(VectorOptions::default().line_width);
         Ok(drawing::Settings {
             // Shapes of GeoJSON are for measuring.
             trap: match self.trap {
@@ -142,6 +169,15 @@ impl Vector {
                 })
                 .collect(),
             crease_angle: self.crease_angle.unwrap_or(usual.crease_angle),
+            most_before: self
+                .hidden_behind
+                .map_or(usual.most_before, |most| most as usize),
+            hidden_spacing,
+            shortest_hidden: if hidden_spacing > 0.0 {
+                hidden_dash(line_width)
+            } else {
+                0.0
+            },
         })
     }
 
@@ -214,6 +250,9 @@ impl Vector {
         }
     }
 }
+
+/// How near, in pixels, hidden lines come to others unless told: 0.7 mm, as ISO 128-20 has it of parallel lines.
+const HIDDEN_SPACING: f64 = 0.7 * values::PIXELS_PER_MM;
 
 /// What is drawn.
 #[derive(Clone, Copy)]

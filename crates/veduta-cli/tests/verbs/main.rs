@@ -18,6 +18,7 @@ mod preview;
 mod readme;
 mod spans;
 mod stored;
+mod viewers;
 
 use assert_cmd::Command;
 use std::fs;

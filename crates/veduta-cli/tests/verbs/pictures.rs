@@ -325,6 +325,14 @@ fn options_of_pixels_and_of_vector_pictures_are_not_mixed() {
             "--lines is for .svg and .pdf",
         ),
         ("-o a.geojson --trap 1", "--trap is for .svg and .pdf"),
+        (
+            "-o a.png --hidden-spacing 1px",
+            "--hidden-spacing is for vector pictures",
+        ),
+        (
+            "-o a.svg --lines crease --hidden-behind 1",
+            "--hidden-behind is for hidden lines",
+        ),
         ("-o a.svg --sampling multiscan:3", "leave --sampling out"),
         ("-o a.svg --background sky.png", "background of one colour"),
     ] {

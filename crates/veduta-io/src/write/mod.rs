@@ -36,7 +36,8 @@ pub(crate) use partial_file::PartialFile;
 pub use partial_file::remove_unfinished;
 #[cfg(any(feature = "svg", feature = "pdf", feature = "geojson"))]
 pub use vector::{
-    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, stream_drawing, write_drawing,
+    MOST_DECIMALS, VECTOR_SUFFIXES, VectorFormat, VectorOptions, hidden_dash, stream_drawing,
+    write_drawing,
 };
 
 use crate::sphere::Panorama;

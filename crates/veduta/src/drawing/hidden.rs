@@ -1,16 +1,18 @@
-//! Hidden edges -> segments.
+//! Edges of faces -> segments, for lines that no side of a fragment tells.
 //!
-//! What is hidden is no fragment, so this looks at faces: all that are in the map's table. Edges are the
-//! sides of their outlines; what an edge is, its faces tell, as for lines that are seen.
+//! What is hidden is no fragment, and veils are seen with what is behind them. So this looks at faces: all that
+//! are in the map's table. Edges are the sides of their outlines, and by `crossings` where they pierce each other;
+//! what an edge is, its faces tell, as for lines that are seen.
 //!
-//! Each edge is hidden where some face covers it that is nearer there. Along an edge the distances from a
+//! Each edge is hidden where some opaque face covers it that is nearer there. Along an edge the distances from a
 //! face's sides and the difference of two nearnesses are affine functions, so that each face hides one
 //! interval, and what is hidden is their union (Appel, "The notion of quantitative invisibility", 1967,
-//! without the bookkeeping that saves looking at faces again).
+//! without the bookkeeping that saves looking at faces again). How many faces hide a part is his quantitative
+//! invisibility.
 
 use super::lines::{JOINED, Judge, normal_of};
 use super::places::{Places, box_around};
-use super::{COINCIDENT, LineKind, is_on_frame};
+use super::{COINCIDENT, LineKind, crossings, is_on_frame};
 use rayon::prelude::*;
 use veduta_geometry::{Affine, DVec2, cross};
 use veduta_map::{FaceId, Faces, VisibilityMap};
@@ -24,26 +26,82 @@ const NEARBY: f64 = 1e-9;
 
 /// An edge of a face as it is seen, or would be.
 #[derive(Clone, Copy)]
-struct Edge {
-    from: DVec2,
-    to: DVec2,
+pub(super) struct Edge {
+    pub kind: LineKind,
+    pub from: DVec2,
+    pub to: DVec2,
     /// Nearness along it.
-    nearness: Affine,
+    pub nearness: Affine,
+    /// Whether it is one of veils, or of a veil and another face: fragments do not tell where it is seen.
+    pub is_of_veil: bool,
 }
 
-/// Where edges of the kinds that `judge` looks for are hidden: segments in the image plane.
-pub(super) fn segments(judge: &Judge, map: &VisibilityMap) -> Vec<[DVec2; 2]> {
+impl Edge {
+    fn length(&self) -> f64 {
+        (self.to - self.from).length()
+    }
+
+    /// The points between two shares of its length.
+    fn part(&self, part: [f64; 2]) -> [DVec2; 2] {
+        part.map(|share| match share {
+            0.0 => self.from,
+            1.0 => self.to,
+            share => self.from.lerp(self.to, share),
+        })
+    }
+}
+
+/// Segments in the image plane: where edges of the kinds that `judge` looks for are hidden by at most
+/// `most_before` faces, if hidden ones are drawn, and where those of veils are seen.
+///
+/// Nothing is told of veils in `unseen` (ascending).
+pub(super) fn segments(
+    judge: &Judge,
+    map: &VisibilityMap,
+    unseen: &[FaceId],
+    most_before: usize,
+) -> Vec<(LineKind, [DVec2; 2])> {
     let faces = (0..map.faces.len() as u32).map(FaceId);
     let boxes: Vec<_> = faces
+        .clone()
         .map(|face| box_around(map.faces.outline(face)))
         .collect();
-    let places = Places::new(boxes.into_iter());
-    let edges = edges(judge, map, &places);
-    let of_edges: Vec<Vec<[DVec2; 2]>> = edges
+    let places = Places::new(boxes.iter().copied());
+    let (veils, opaque): (Vec<FaceId>, Vec<FaceId>) = faces
+        .filter(|face| unseen.binary_search(face).is_err())
+        .partition(|&face| map.faces.is_veil(face));
+    let has_hidden = judge.wants(LineKind::Hidden);
+    let mut all = edges(judge, map, &places, &veils);
+    if has_hidden {
+        all.extend(edges(judge, map, &places, &opaque));
+    }
+    if judge.wants(LineKind::Crease) {
+        let of_interest = if has_hidden { &opaque[..] } else { &[] };
+        all.extend(crossings::edges(
+            judge,
+            map,
+            &places,
+            &boxes,
+            &veils,
+            of_interest,
+            unseen,
+        ));
+    }
+    let of_edges: Vec<Vec<(LineKind, [DVec2; 2])>> = all
         .par_iter()
         .map_init(Vec::new, |near, edge| {
             places.along(edge.from, edge.to, NEARBY, near);
-            hidden_parts(map, edge, near)
+            let hidden = hidden_parts(map, edge, near);
+            let mut segments = Vec::new();
+            if edge.is_of_veil {
+                let seen = between(&hidden, edge.length());
+                segments.extend(seen.map(|part| (edge.kind, edge.part(part))));
+            }
+            if has_hidden {
+                let drawn = joined(hidden.iter().filter(|hidden| hidden.before <= most_before));
+                segments.extend(drawn.map(|part| (LineKind::Hidden, edge.part(part))));
+            }
+            segments
         })
         .collect();
     of_edges.into_iter().flatten().collect()
@@ -57,12 +115,18 @@ struct Side {
     face: FaceId,
     /// Whether it runs from the first of its ends to the other, which tells on which side the face lies.
     forth: bool,
-    /// Nearness of the face in the middle.
+    /// Nearness of the face at [`inner`].
     nearness: f64,
 }
 
-/// The edges of the kinds that are looked for.
-fn edges(judge: &Judge, map: &VisibilityMap, places: &Places) -> Vec<Edge> {
+/// The point of a side at which faces that share it are told from others. Not its middle: that is where what is
+/// symmetric pierces itself.
+fn inner([from, to]: [DVec2; 2]) -> DVec2 {
+    from.lerp(to, 0.382)
+}
+
+/// The edges of the kinds that are looked for, of `faces`: all veils, or all others.
+fn edges(judge: &Judge, map: &VisibilityMap, places: &Places, of: &[FaceId]) -> Vec<Edge> {
     let faces = &map.faces;
     let sides_of = |face: FaceId| {
         let outline = faces.outline(face);
@@ -73,19 +137,18 @@ fn edges(judge: &Judge, map: &VisibilityMap, places: &Places) -> Vec<Edge> {
                 return None;
             }
             let forth = (from.x, from.y) <= (to.x, to.y);
+            let ends = if forth { [from, to] } else { [to, from] };
             Some(Side {
-                ends: if forth { [from, to] } else { [to, from] },
+                ends,
                 face,
                 forth,
-                nearness: plane.at(0.5 * (from + to)),
+                nearness: plane.at(inner(ends)),
             })
         })
     };
-    let mut sides: Vec<Side> = (0..faces.len() as u32)
-        .into_par_iter()
-        .map(FaceId)
-        .filter(|&face| !faces.is_veil(face))
-        .flat_map_iter(sides_of)
+    let mut sides: Vec<Side> = of
+        .par_iter()
+        .flat_map_iter(|&face| sides_of(face))
         .collect();
     let place = |side: &Side| side.ends.map(|end| [end.x, end.y]);
     let order = |a: &Side, b: &Side| {
@@ -105,14 +168,15 @@ fn edges(judge: &Judge, map: &VisibilityMap, places: &Places) -> Vec<Edge> {
     joined
         .par_iter()
         .map_init(Vec::new, |near, sides| {
-            is_wanted(judge, map, places, sides, near).then(|| edge(faces, sides))
+            let kind = kind(judge, map, places, sides, near)?;
+            Some(edge(faces, sides, kind))
         })
         .filter_map(|edge| edge)
         .collect()
 }
 
 /// The edge that some faces share.
-fn edge(faces: &Faces, sides: &[Side]) -> Edge {
+fn edge(faces: &Faces, sides: &[Side], kind: LineKind) -> Edge {
     let slope = |side: &Side| {
         let plane = faces.face_nearness(side.face);
         plane.a.hypot(plane.b)
@@ -120,21 +184,25 @@ fn edge(faces: &Faces, sides: &[Side]) -> Edge {
     // The flattest: steep planes multiply rounding.
     let flattest = sides.iter().min_by(|a, b| slope(a).total_cmp(&slope(b)));
     let [from, to] = sides[0].ends;
+    let face = flattest.expect("an edge has a face").face;
     Edge {
+        kind,
         from,
         to,
-        nearness: *faces.face_nearness(flattest.expect("an edge has a face").face),
+        nearness: *faces.face_nearness(face),
+        is_of_veil: faces.is_veil(face),
     }
 }
 
-/// Whether the edge that some faces share is of a kind that is looked for.
-fn is_wanted(
+/// The kind of the edge that some faces share, if it is one that is looked for.
+fn kind(
     judge: &Judge,
     map: &VisibilityMap,
     places: &Places,
     sides: &[Side],
     near: &mut Vec<u32>,
-) -> bool {
+) -> Option<LineKind> {
+    use LineKind::{Boundary, Crease, Silhouette};
     let faces = &map.faces;
     let first = &sides[0];
     let angle_with = |other: FaceId| {
@@ -142,43 +210,41 @@ fn is_wanted(
         let [one, other] = planes.map(|plane| normal_of(&map.camera, plane));
         one.angle_between(other)
     };
-    if let [_, rest @ ..] = sides
-        && !rest.is_empty()
-    {
+    let is_crease = |other| judge.is_crease([first.face, other], angle_with(other));
+    let is_boundary = || judge.wants(Boundary) && judge.is_boundary(first.face, first.ends);
+    let rest = &sides[1..];
+    if !rest.is_empty() {
         // Where all faces lie on one side of the edge, the surface turns away from the eye.
-        let is_contour = rest.iter().all(|side| side.forth == first.forth);
-        if is_contour {
-            // Faces on both sides of one sheet have no contour between them.
-            let turns = rest
-                .iter()
-                .any(|side| angle_with(side.face) > COPLANAR_ANGLE);
-            return turns && judge.wants(LineKind::Silhouette)
-                || judge.wants(LineKind::Boundary) && judge.is_boundary(first.face, first.ends);
+        if rest.iter().any(|side| side.forth != first.forth) {
+            let mut others = rest.iter().map(|side| side.face);
+            return others.any(is_crease).then_some(Crease);
         }
-        return rest
-            .iter()
-            .any(|side| judge.is_crease([first.face, side.face], angle_with(side.face)));
+        // Faces on both sides of one sheet have no contour between them.
+        let mut others = rest.iter().map(|side| side.face);
+        let turns = others.any(|other| angle_with(other) > COPLANAR_ANGLE);
+        let is_silhouette = turns && judge.wants(Silhouette);
+        return (is_silhouette.then_some(Silhouette)).or_else(|| is_boundary().then_some(Boundary));
     }
-    let is_boundary = || judge.is_boundary(first.face, first.ends);
     // A corner of one may lie on the edge of the other, so that they share no edge.
-    let [from, to] = first.ends;
-    let middle = 0.5 * (from + to);
-    places.along(middle, middle, NEARBY, near);
+    let inner = inner(first.ends);
+    places.along(inner, inner, NEARBY, near);
     let unit = JOINED * super::join::depth_unit(&map.camera, first.nearness);
+    let is_opaque = !faces.is_veil(first.face);
     let other = near.iter().map(|&face| FaceId(face)).find(|&other| {
         other != first.face
-            && !faces.is_veil(other)
-            && (faces.face_nearness(other).at(middle) - first.nearness).abs() <= unit
-            && contains(faces.outline(other), middle)
+            && !(is_opaque && faces.is_veil(other))
+            && (faces.face_nearness(other).at(inner) - first.nearness).abs() <= unit
+            && contains(faces.outline(other), inner)
     });
     match other {
-        Some(other) => {
-            judge.is_crease([first.face, other], angle_with(other))
-                || judge.wants(LineKind::Boundary) && is_boundary()
-        }
+        Some(_) if is_boundary() => Some(Boundary),
+        Some(other) => is_crease(other).then_some(Crease),
         // Its neighbour is seen edge-on, if it has one. Otherwise it comes of the near plane's cut.
-        None if judge.wants(LineKind::Silhouette) => judge.is_edge(first.face, first.ends),
-        None => judge.wants(LineKind::Boundary) && is_boundary(),
+        None if judge.wants(Silhouette) => {
+            let is_edge = judge.is_edge(first.face, first.ends);
+            is_edge.then_some(Silhouette)
+        }
+        None => is_boundary().then_some(Boundary),
     }
 }
 
@@ -193,47 +259,81 @@ fn contains(outline: &[DVec2], point: DVec2) -> bool {
     })
 }
 
-/// Where an edge is hidden by the faces near it.
-fn hidden_parts(map: &VisibilityMap, edge: &Edge, near: &[u32]) -> Vec<[DVec2; 2]> {
-    let length = (edge.to - edge.from).length();
-    let mut intervals: Vec<[f64; 2]> = near
+/// A part of an edge, in shares of its length, that is hidden, and by how many faces.
+struct Hidden {
+    part: [f64; 2],
+    before: usize,
+}
+
+/// Where an edge is hidden by the faces near it, in order.
+fn hidden_parts(map: &VisibilityMap, edge: &Edge, near: &[u32]) -> Vec<Hidden> {
+    let length = edge.length();
+    // Where a face begins and ends to hide it.
+    let mut borders: Vec<(f64, isize)> = near
         .iter()
         .filter_map(|&face| hidden_by(map, edge, FaceId(face)))
+        .flat_map(|[start, end]| [(start, 1), (end, -1)])
         .collect();
-    intervals.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    let mut parts: Vec<[f64; 2]> = Vec::new();
-    for [start, end] in intervals {
+    borders.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut parts: Vec<Hidden> = Vec::new();
+    let mut before = 0isize;
+    for pair in borders.windows(2) {
+        before += pair[0].1;
+        let part = [pair[0].0, pair[1].0];
+        if before == 0 || (part[1] - part[0]) * length <= NEGLIGIBLE_LENGTH {
+            continue;
+        }
+        let before = before.unsigned_abs();
         match parts.last_mut() {
-            Some(last) if (start - last[1]) * length <= NEGLIGIBLE_LENGTH => {
-                last[1] = last[1].max(end);
+            // What rounding leaves between them belongs to both.
+            Some(last) if (part[0] - last.part[1]) * length <= NEGLIGIBLE_LENGTH => {
+                if last.before == before {
+                    last.part[1] = part[1];
+                } else {
+                    let start = last.part[1];
+                    parts.push(Hidden {
+                        part: [start, part[1]],
+                        before,
+                    });
+                }
             }
-            _ => parts.push([start, end]),
+            _ => parts.push(Hidden { part, before }),
         }
     }
-    let at = |share: f64| match share {
-        0.0 => edge.from,
-        1.0 => edge.to,
-        share => edge.from.lerp(edge.to, share),
-    };
+    // And at the ends.
+    if let Some(first) = parts.first_mut()
+        && first.part[0] * length <= NEGLIGIBLE_LENGTH
+    {
+        first.part[0] = 0.0;
+    }
+    if let Some(last) = parts.last_mut()
+        && (1.0 - last.part[1]) * length <= NEGLIGIBLE_LENGTH
+    {
+        last.part[1] = 1.0;
+    }
     parts
+}
+
+/// Parts in order, those that touch in one.
+fn joined<'a>(parts: impl Iterator<Item = &'a Hidden>) -> impl Iterator<Item = [f64; 2]> {
+    let mut joined: Vec<[f64; 2]> = Vec::new();
+    for &Hidden { part, .. } in parts {
+        match joined.last_mut() {
+            Some(last) if last[1] == part[0] => last[1] = part[1],
+            _ => joined.push(part),
+        }
+    }
+    joined.into_iter()
+}
+
+/// The parts of an edge of that length between hidden ones.
+fn between(hidden: &[Hidden], length: f64) -> impl Iterator<Item = [f64; 2]> {
+    let starts = [0.0]
         .into_iter()
-        .map(|[start, end]| {
-            // What rounding leaves at the ends.
-            let start = if start * length <= NEGLIGIBLE_LENGTH {
-                0.0
-            } else {
-                start
-            };
-            let end = if (1.0 - end) * length <= NEGLIGIBLE_LENGTH {
-                1.0
-            } else {
-                end
-            };
-            [start, end]
-        })
-        .filter(|[start, end]| (end - start) * length > NEGLIGIBLE_LENGTH)
-        .map(|part| part.map(at))
-        .collect()
+        .chain(hidden.iter().map(|hidden| hidden.part[1]));
+    let ends = hidden.iter().map(|hidden| hidden.part[0]).chain([1.0]);
+    let parts = starts.zip(ends).map(|(start, end)| [start, end]);
+    parts.filter(move |[start, end]| (end - start) * length > NEGLIGIBLE_LENGTH)
 }
 
 /// The part of an edge, as shares of its length, that a face hides.
@@ -261,7 +361,7 @@ fn hidden_by(map: &VisibilityMap, edge: &Edge, face: FaceId) -> Option<[f64; 2]>
 }
 
 /// The part in which an affine function with these values at 0 and 1 is positive.
-fn positive([start, end]: [f64; 2], at_start: f64, at_end: f64) -> Option<[f64; 2]> {
+pub(super) fn positive([start, end]: [f64; 2], at_start: f64, at_end: f64) -> Option<[f64; 2]> {
     let part = match (at_start > 0.0, at_end > 0.0) {
         (true, true) => [start, end],
         (false, false) => return None,

@@ -27,9 +27,9 @@ struct Seen {
 /// have to be alike too.
 const COPLANAR: f64 = 1e-5;
 
-/// How much the colours of flat faces may differ, as a share of the brightest channel: less than half a step
-/// of 8-bit sRGB. Those of faces in one plane differ by the rounding of normals.
-const SAME_COLOR: f32 = 4e-3;
+/// How much the colours of flat faces may differ, as a share of the brightest channel: less than a step of
+/// 8-bit sRGB, which is 9e-3 at white and more below. Those of faces in one plane differ by the rounding of normals.
+const SAME_COLOR: f32 = 6e-3;
 
 /// Joins faces to regions; in the order of their first faces.
 ///

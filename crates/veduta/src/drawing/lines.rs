@@ -1,12 +1,12 @@
 //! Edges -> strokes.
 //!
 //! Sides of fragments that lie between two faces are told apart by what the map knows: the planes on
-//! either side. Only for edges with a single face the mesh is asked. What is hidden is in no fragment; that
-//! is looked for among all faces, by `hidden`.
+//! either side. Only for edges with a single face the mesh is asked. What is hidden is in no fragment, and those of
+//! veils do not part them; that is looked for among all faces, by `hidden`.
 
 use super::join::depth_unit;
 use super::subdivision::{HalfEdge, Subdivision};
-use super::{COINCIDENT, LineKind, Settings, Stroke, hidden, is_on_frame, trace};
+use super::{COINCIDENT, LineKind, Look, Settings, Stroke, hidden, is_on_frame, spacing, trace};
 use crate::dice::PixelGrid;
 use crate::scene::{Mesh, MeshId, Scene};
 use std::collections::HashMap;
@@ -33,6 +33,7 @@ struct Piece {
 pub(super) fn strokes(
     scene: &Scene,
     map: &VisibilityMap,
+    veil_looks: &[Look],
     subdivision: &Subdivision,
     grid: &PixelGrid,
     settings: &Settings,
@@ -47,9 +48,9 @@ pub(super) fn strokes(
         Some((kind, subdivision.ends(index)))
     });
     let mut segments: Vec<(LineKind, [DVec2; 2])> = seen.collect();
-    if settings.lines.contains(&LineKind::Hidden) {
-        let hidden = hidden::segments(&judge, map);
-        segments.extend(hidden.into_iter().map(|ends| (LineKind::Hidden, ends)));
+    if settings.lines.contains(&LineKind::Hidden) || !map.veils.is_empty() {
+        let unseen = unseen_veils(map, veil_looks);
+        segments.extend(hidden::segments(&judge, map, &unseen, settings.most_before));
     }
     let (pieces, vertices) = each_once(&segments);
     let of_kinds = pieces.chunk_by(|a, b| a.kind == b.kind);
@@ -58,7 +59,17 @@ pub(super) fn strokes(
         .filter(|stroke| !stroke.points.is_empty())
         .collect();
     strokes.sort_by_key(|stroke| stroke.kind != LineKind::Hidden);
-    strokes
+    spacing::kept(strokes, settings)
+}
+
+/// The veils that are wholly transparent where they are not hidden, ascending.
+fn unseen_veils(map: &VisibilityMap, looks: &[Look]) -> Vec<FaceId> {
+    let veils = looks.iter().enumerate();
+    let transparent = veils.filter(|(_, look)| look.opacity <= 0.0);
+    let mut faces: Vec<FaceId> = transparent.map(|(veil, _)| map.veils.face(veil)).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces
 }
 
 /// How near to one another, in frame heights or widths, lines are one. Larger than the distance within which
@@ -118,10 +129,10 @@ impl<'a> Judge<'a> {
         wanted.sort_unstable();
         let mut face_counts = HashMap::new();
         if wanted.contains(&LineKind::Boundary) {
-            // Of all faces if what is hidden may be asked for.
+            // Of all faces if what is hidden or veiled may be asked for.
             let mut faces: Vec<FaceId> =
                 (0..map.opaque.len()).map(|k| map.opaque.face(k)).collect();
-            if wanted.contains(&LineKind::Hidden) {
+            if wanted.contains(&LineKind::Hidden) || !map.veils.is_empty() {
                 faces = map.faces.ids().collect();
             }
             for face in faces {

@@ -13,17 +13,20 @@
 //! 5. `trap`: against seams, a shape reaches a little under those painted later.
 //! 6. `underpainting`: what lies below all of them, where they have no room for that, and their common outline.
 //! 7. `veils`: regions of faces that are not fully opaque, painted on top of the others far to near.
-//! 8. `lines`: visible edges as strokes, and by `hidden` those that are not.
+//! 8. `lines`: visible edges as strokes; by `hidden` those that are not, and those of veils, with `crossings` where
+//!    faces pierce each other; by `spacing` hidden ones keep away from other lines.
 //!
 //! Outlines are those of the map within 1e-12 of the frame. The result is the same for any number of
 //! threads.
 
+mod crossings;
 mod hidden;
 mod join;
 mod lines;
 mod near;
 mod order;
 mod places;
+mod spacing;
 mod subdivision;
 mod trace;
 mod trap;
@@ -83,10 +86,18 @@ pub struct Settings {
     pub lines: Vec<LineKind>,
     /// The angle in radians between two faces above which their edge is a [`LineKind::Crease`].
     pub crease_angle: f64,
+    /// The most faces behind which [`LineKind::Hidden`] are drawn: the quantitative invisibility of Appel (1967).
+    pub most_before: usize,
+    /// How near, in pixels, hidden lines may come to lines beside them; parts that come nearer are left out. 0 for
+    /// all.
+    pub hidden_spacing: f64,
+    /// The length in pixels that hidden lines need to be drawn.
+    pub shortest_hidden: f64,
 }
 
 impl Default for Settings {
-    /// Shapes of one colour that reach 2 pixels under others, no lines; creases from 30 degrees.
+    /// Shapes of one colour that reach 2 pixels under others, no lines; creases from 30 degrees, and all that is
+    /// hidden.
     fn default() -> Self {
         Self {
             trap: 2.0,
@@ -94,6 +105,9 @@ impl Default for Settings {
             shapes: true,
             lines: Vec::new(),
             crease_angle: 30f64.to_radians(),
+            most_before: usize::MAX,
+            hidden_spacing: 0.0,
+            shortest_hidden: 0.0,
         }
     }
 }
@@ -109,7 +123,7 @@ pub enum Joining {
     Colors,
 }
 
-/// An edge, by what makes it one.
+/// An edge, by what makes it one. Those of faces that are not fully opaque are seen as others are, and hide none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LineKind {
     /// What is across is farther away, or nothing: the outline of something before something.
@@ -118,8 +132,7 @@ pub enum LineKind {
     Boundary,
     /// Two faces meet at an angle, along an edge or where they pierce each other.
     Crease,
-    /// An edge of one of the other kinds that are drawn, where it is hidden. (Where faces pierce each other
-    /// there is no edge.)
+    /// An edge of one of the other kinds that are drawn, where it is hidden.
     Hidden,
 }
 
@@ -273,7 +286,7 @@ pub fn draw(
         .map(|fragment| join::polygon_of(map, fragment))
         .collect();
     let subdivision = Subdivision::new(&polygons, COINCIDENT);
-    let strokes = lines::strokes(scene, map, &subdivision, grid, settings);
+    let strokes = lines::strokes(scene, map, veil_looks, &subdivision, grid, settings);
     let (groups, shapes, underpainting) = if settings.shapes {
         shapes(scene, map, &subdivision, looks, grid, settings)
     } else {

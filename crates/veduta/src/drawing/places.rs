@@ -34,6 +34,19 @@ impl Places {
         }
     }
 
+    /// Those that may lie in a box, ascending.
+    pub fn within(&self, [low, high]: [DVec2; 2], near: &mut Vec<u32>) {
+        near.clear();
+        for row in range(self.cells, low.y, high.y) {
+            for column in range(self.cells, low.x, high.x) {
+                let rows = self.in_cells.of((row * self.cells + column) as usize);
+                near.extend(rows.iter().map(|&row| self.things[row as usize]));
+            }
+        }
+        near.sort_unstable();
+        near.dedup();
+    }
+
     /// Those that may lie within `margin` of a segment, ascending.
     pub fn along(&self, from: DVec2, to: DVec2, margin: f64, near: &mut Vec<u32>) {
         near.clear();

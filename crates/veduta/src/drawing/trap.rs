@@ -371,8 +371,16 @@ impl<'a> Trapper<'a> {
             if next > MOST_SEARCHED {
                 return false;
             }
-            for edge in self.subdivision.around(fragment) {
-                if !zone.meets(self.pixels(edge), distance) {
+            let edges = self.subdivision.around(fragment);
+            let corners = edges.clone().map(|edge| self.pixels(edge)[0]);
+            let rounding = if zone.has_no_room_for(corners) {
+                // It is as if what lies beyond lay along the zone's border.
+                2.0 * COINCIDENT
+            } else {
+                -COINCIDENT
+            };
+            for edge in edges {
+                if !zone.meets(self.pixels(edge), distance, rounding) {
                     continue;
                 }
                 match self.subdivision.across(edge) {
@@ -516,13 +524,21 @@ impl Zone {
         })
     }
 
-    /// Whether a part of a segment lies in the zone, or within a distance of it under later shapes.
-    fn meets(&self, [from, to]: [DVec2; 2], distance: f64) -> bool {
+    /// Whether a polygon lies along the shape or a limit, thinner than rounding.
+    fn has_no_room_for(&self, corners: impl Iterator<Item = DVec2> + Clone) -> bool {
+        self.half_planes.iter().any(|half_plane| {
+            let is_along = |point| half_plane.inside.at(point).abs() <= COINCIDENT;
+            half_plane.kind == Border::Own && corners.clone().all(is_along)
+        })
+    }
+
+    /// Whether a part of a segment lies in the zone, or within a distance of it under later shapes, or
+    /// within `rounding` of the shape and of limits: a negative one leaves out what lies along those.
+    fn meets(&self, [from, to]: [DVec2; 2], distance: f64, rounding: f64) -> bool {
         let mut part = [0.0, 1.0];
         for half_plane in &self.half_planes {
-            // What lies along the shape or a limit lies outside but for rounding.
             let margin = match half_plane.kind {
-                Border::Own => -COINCIDENT,
+                Border::Own => rounding,
                 Border::Free | Border::Cap => distance,
             };
             let [start, end] = [from, to].map(|end| half_plane.inside.at(end) + margin);

@@ -176,9 +176,13 @@ fn name_of_lines(kind: LineKind) -> &'static str {
     }
 }
 
+/// The length of a dash of hidden lines beside others of `width`, in the same unit.
+pub fn hidden_dash(width: f64) -> f64 {
+    hidden_line(width)[1]
+}
+
 /// Width, dash and gap of hidden lines beside others of `width`: narrow and dashed, in the proportions of
 /// ISO 128 (a dash of twelve widths, a gap of three).
-#[cfg(any(feature = "svg", feature = "pdf"))]
 fn hidden_line(width: f64) -> [f64; 3] {
     let narrow = 0.5 * width;
     [narrow, 12.0 * narrow, 3.0 * narrow]

@@ -240,12 +240,14 @@ impl Svg {
     /// Goes on with a path from where it is, and returns where it is then.
     fn path_from(&mut self, mut start: Point, rings: &[Vec<Point>], closed: bool) -> Point {
         for ring in rings {
+            let first = if closed { shortest(start, ring) } else { 0 };
+            let [before, after] = [&ring[..first], &ring[first..]];
             self.text.push('m');
-            self.numbers(&[ring[0][0] - start[0], ring[0][1] - start[1]], true);
-            let mut at = ring[0];
+            self.numbers(&[after[0][0] - start[0], after[0][1] - start[1]], true);
+            let mut at = after[0];
             // Pairs after `m` and `l` go on as lines.
             let mut is_line = true;
-            for &point in &ring[1..] {
+            for &point in after[1..].iter().chain(before) {
                 let step = [point[0] - at[0], point[1] - at[1]];
                 at = point;
                 match step {
@@ -272,7 +274,7 @@ impl Svg {
             if closed {
                 self.text.push('z');
                 // It goes back there.
-                start = ring[0];
+                start = after[0];
             }
         }
         start
@@ -287,6 +289,28 @@ impl Svg {
             self.push(format_args!("{value}"));
         }
     }
+}
+
+/// The corner of a ring to begin with, for a short path that comes from `start`: the way there is written, and the
+/// side before it is not, since the path closes with that.
+fn shortest(start: Point, ring: &[Point]) -> usize {
+    let written = |from: Point, to: Point| -> i64 {
+        let steps = [to[0] - from[0], to[1] - from[1]].map(|step| {
+            let digits = step.unsigned_abs().checked_ilog10().unwrap_or(0);
+            // With a sign or a space before them.
+            i64::from(digits) + 2
+        });
+        match steps {
+            [along, _] if to[1] == from[1] => along,
+            [_, along] if to[0] == from[0] => along,
+            [across, down] => across + down,
+        }
+    };
+    let cost = |&corner: &usize| {
+        let before = ring[(corner + ring.len() - 1) % ring.len()];
+        written(start, ring[corner]) - written(before, ring[corner])
+    };
+    (0..ring.len()).min_by_key(cost).unwrap_or(0)
 }
 
 /// Letters that XML names may have, of those beyond ASCII: what Unicode calls letters within the ranges
