@@ -7,7 +7,7 @@ use super::stored::{
     Changes, Stored, Trust, laid_on, open, refusal, refuse_filter_of_guests, refuse_place,
     tell_work,
 };
-use super::{tell_of_mattes, tell_shortcomings, unknown_name};
+use super::{tell_of_mattes, tell_of_nothing, tell_shortcomings, unknown_name};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use clap::Args;
@@ -187,6 +187,7 @@ impl Composite {
                 grid,
             };
             tell_of_mattes(&self.inputs[0], &layers, self.strict, talk)?;
+            tell_of_nothing(&self.inputs[0], &picture, self.strict, talk)?;
             talk.begin("developing");
             told["exposure"] = development.develop(&mut picture, !target.linear).into();
             talk.begin("writing");
@@ -379,7 +380,7 @@ impl Composite {
             _ => Some(unite(&embedded.iter().collect::<Vec<_>>())),
         };
         if let Some(scene) = &mut embedded {
-            self.changes.apply_to_casters(scene)?;
+            self.changes.apply_unheard(scene)?;
         }
         Ok(Origin {
             sources,

@@ -4,9 +4,11 @@ use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 use crate::values::{self, Background};
 use clap::{Args, ValueEnum};
+use rayon::prelude::*;
 use std::path::Path;
 use veduta::accumulate::Picture;
 use veduta::filter::Filter;
+use veduta::reproject::Projection;
 use veduta::scene::Scene;
 use veduta_io::read_picture;
 use veduta_io::tone::{self, Exposure, Tone};
@@ -74,6 +76,7 @@ enum Backdrop {
 #[derive(Debug)]
 pub struct Development {
     backdrop: Backdrop,
+    within: Option<Projection>,
     exposure: Option<Exposure>,
     tone: Option<Tone>,
     unlit: bool,
@@ -162,6 +165,7 @@ impl Look {
         let has_materials = !scene.materials.is_empty();
         Ok(Development {
             backdrop,
+            within: None,
             exposure: self.exposure,
             tone: self.tone.map(|tone| match tone {
                 ToneArgument::None => Tone::None,
@@ -210,6 +214,17 @@ impl Development {
         }
     }
 
+    /// Exposes all pictures as `whole` would be exposed, of which they are parts.
+    pub fn expose_as(&mut self, whole: &Picture, for_display: bool) {
+        let ev = tone::exposure_of(whole, self.exposure_asked(for_display));
+        self.exposure = Some(Exposure::Ev(ev));
+    }
+
+    /// Lays backgrounds only where the lens of that picture looks: what is beyond stays clear.
+    pub fn within(&mut self, projection: Projection) {
+        self.within = Some(projection);
+    }
+
     /// [`Development::develop`] with an exposure that is known.
     pub fn develop_at(&self, picture: &mut Picture, ev: f32, for_display: bool) {
         if ev != 0.0 {
@@ -221,10 +236,54 @@ impl Development {
             Tone::None
         });
         tone::apply_tone(picture, curve);
+        let rims = match (&self.backdrop, &self.within) {
+            (Backdrop::Color(_) | Backdrop::Picture(_), Some(lens)) => rims(picture, lens),
+            _ => Vec::new(),
+        };
         match &self.backdrop {
             Backdrop::None => {}
             Backdrop::Color(color) => tone::lay_on(picture, *color),
             Backdrop::Picture(behind) => tone::lay_on_picture(picture, behind),
         }
+        for Rim { pixel, own, share } in rims {
+            let whole = &mut picture.pixels[pixel];
+            for (channel, own) in whole.iter_mut().zip(own) {
+                *channel = own + (*channel - own) * share;
+            }
+        }
     }
+}
+
+/// A pixel of which a part lies beyond the lens.
+struct Rim {
+    pixel: usize,
+    /// What it shows before anything is laid behind it.
+    own: [f32; 4],
+    /// Of what is laid behind it, the share that the lens sees.
+    share: f32,
+}
+
+/// The pixels that the lens does not fill.
+fn rims(picture: &Picture, lens: &Projection) -> Vec<Rim> {
+    // A preview is smaller than the picture.
+    let scale = f64::from(lens.width) / f64::from(picture.width);
+    let rows = picture.pixels.par_chunks(picture.width as usize);
+    let of_rows = rows.enumerate().map(|(row, pixels)| {
+        let of_pixel = |(column, own): (usize, &[f32; 4])| {
+            let [column, row] = [column, row].map(|at| ((at as f64 + 0.5) * scale) as u32);
+            let covered = lens.coverage(column, row) as f32;
+            let open = 1.0 - own[3];
+            let share = ((covered - own[3]) / open).clamp(0.0, 1.0);
+            (covered < 1.0 && open > 0.0).then_some((*own, share))
+        };
+        let first = row * picture.width as usize;
+        let rims = pixels.iter().enumerate().map(of_pixel).enumerate();
+        let rims = rims.filter_map(|(column, rim)| {
+            let (own, share) = rim?;
+            let pixel = first + column;
+            Some(Rim { pixel, own, share })
+        });
+        rims.collect::<Vec<Rim>>()
+    });
+    of_rows.collect::<Vec<_>>().into_iter().flatten().collect()
 }

@@ -28,6 +28,7 @@ use crate::values;
 use clap::{Args, ValueEnum};
 use output::Output;
 use std::path::Path;
+use veduta::accumulate::Picture;
 use veduta::pipeline::Shortcoming;
 use veduta::scene::{Scene, Shown};
 use veduta_io::{
@@ -250,4 +251,18 @@ fn unknown_name<'a>(
         [] => format!("it has no {what}"),
         names => format!("it has: {}", names.join(", ")),
     }
+}
+
+/// Warns of a picture in which nothing is seen; if strict, fails.
+fn tell_of_nothing(
+    file: &Path,
+    picture: &Picture,
+    strict: bool,
+    talk: &mut Talk,
+) -> Result<(), Failure> {
+    if picture.pixels.iter().any(|pixel| pixel[3] != 0.0) {
+        return Ok(());
+    }
+    let message = format!("{}: nothing is seen in this picture of it", file.display());
+    talk.warn_or_fail(message, strict, Code::BadInput)
 }

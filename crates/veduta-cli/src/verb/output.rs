@@ -422,6 +422,14 @@ impl Target {
     pub fn name(&self) -> String {
         self.place.name()
     }
+
+    /// The file, if it is not stdout.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.place {
+            Place::Stdout => None,
+            Place::File(path) => Some(path),
+        }
+    }
 }
 
 impl Place {

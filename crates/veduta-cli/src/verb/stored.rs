@@ -186,8 +186,8 @@ impl Changes {
         Ok(())
     }
 
-    /// The same for what casts shadows of a scene that was told all warnings.
-    pub fn apply_to_casters(&self, scene: &mut Scene) -> Result<(), Failure> {
+    /// The same for another part of a scene that was told all warnings.
+    pub fn apply_unheard(&self, scene: &mut Scene) -> Result<(), Failure> {
         for step in self.steps()? {
             step.apply(scene)?;
         }

@@ -57,6 +57,38 @@ fn filtered_pictures_and_crosses_are_made_too() {
     assert_refused(refused, 2, message);
 }
 
+#[test]
+fn a_background_ends_where_the_lens_does() {
+    let folder = Folder::new();
+    let asked = format!("render town.obj {BEFORE} --lens domemaster --size 64x64 --unlit");
+    folder.told(&format!("{asked} --background #fff -o dome.png"));
+    let (_, _, pixels) = png(&folder.read("dome.png"));
+    let pixel = |x: usize, y: usize| pixels[y * 64 + x];
+    assert_eq!(pixel(32, 32), [255; 4]);
+    assert_eq!([pixel(0, 0)[3], pixel(63, 63)[3]], [0, 0]);
+    let rim = pixels.iter().filter(|pixel| (1..255).contains(&pixel[3]));
+    assert!(rim.count() > 100, "the rim is smooth");
+}
+
+#[test]
+fn a_panorama_says_that_it_is_one() {
+    let folder = Folder::new();
+    for (size, is_told) in [("64x32", true), ("64x48", false)] {
+        for file in ["a.png", "a.jpg"] {
+            folder.told(&format!(
+                "render town.obj {BEFORE} --lens equirect --size {size} -o {file}"
+            ));
+            let bytes = folder.read(file);
+            let found = bytes.windows(6).any(|part| part == b"GPano:");
+            assert_eq!(found, is_told, "{size}, {file}");
+        }
+    }
+    let refused = folder.veduta(&format!(
+        "render town.obj {BEFORE} --lens cube -o side_{{side}}.png"
+    ));
+    assert_refused(refused, 2, contains("veduta dome CROSS --lens cube"));
+}
+
 fn assert_refused(
     mut command: assert_cmd::Command,
     code: i32,

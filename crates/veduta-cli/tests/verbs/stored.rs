@@ -70,6 +70,60 @@ fn a_scaled_window_is_cut_from_the_scaled_picture() {
 }
 
 #[test]
+fn a_window_is_exposed_as_the_whole_and_knows_what_is_beside_it() {
+    let folder = Folder::new();
+    folder.told(&format!("render town.obj {FACING} -o town.veduta"));
+    let whole = folder.json("shade town.veduta -o whole.png");
+    // The right end, where the box is not seen.
+    let part = folder.json(
+        "shade town.veduta --window 5,0,3,8 --set material.blue.color=#0f0 --strict -o part.png",
+    );
+    let recoloured = folder.json("shade town.veduta --set material.blue.color=#0f0 -o other.png");
+    assert_eq!(part["warnings"], json!([]));
+    assert_eq!(part["exposure"], recoloured["exposure"]);
+    let part = folder.json("shade town.veduta --window 5,0,3,8 -o part.png");
+    assert_eq!(part["exposure"], whole["exposure"]);
+    let [(width, _, whole), (part_width, _, part)] =
+        ["whole.png", "part.png"].map(|name| png(&folder.read(name)));
+    for (index, pixel) in part.into_iter().enumerate() {
+        let (x, y) = (5 + index % part_width, index / part_width);
+        assert_eq!(pixel, whole[y * width + x], "{x}, {y}");
+    }
+    let told = folder.json("shade town.veduta --window 999,0,3,8 -o nothing.png");
+    let warnings = told["warnings"].to_string();
+    assert!(warnings.contains("nothing is seen"), "{warnings}");
+}
+
+#[test]
+fn objects_of_deep_pictures_are_chosen_by_their_names() {
+    let folder = folder_of_two();
+    folder.told(&format!(
+        "render box.obj {FACING} --unlit -o deep.exr --deep"
+    ));
+    let asked = "composite wall.veduta deep.exr --depth-kind planar --unlit";
+    folder.told("shade wall.veduta --unlit -o wall.exr");
+    folder.told(&format!("{asked} -o both.exr"));
+    folder.told(&format!("{asked} --without box -o without.exr"));
+    assert!(folder.read("without.exr") == folder.read("wall.exr"));
+    assert!(folder.read("both.exr") != folder.read("wall.exr"));
+    folder.told(&format!("{asked} --only box -o only.exr"));
+    let told = folder.json("composite deep.exr --unlit -o deep-alone.exr");
+    assert_eq!(told["warnings"], json!([]));
+    let found = folder.json("diff only.exr deep-alone.exr --tolerance 10");
+    assert_eq!(found["equal"], true, "{found}");
+    for (asked, code, message) in [
+        ("--only bx", 3, "did you mean \"box\"?"),
+        ("--matte box", 5, "hide by depth only"),
+    ] {
+        folder
+            .veduta(&format!("composite wall.veduta deep.exr {asked} -o x.exr"))
+            .assert()
+            .code(code)
+            .stderr(predicates::str::contains(message));
+    }
+}
+
+#[test]
 fn materials_change_as_in_a_scene_file() {
     let folder = Folder::new();
     folder.told(&format!("render town.obj {FACING} -o town.veduta"));

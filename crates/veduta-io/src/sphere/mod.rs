@@ -25,6 +25,8 @@ pub use views::{
     sides_in_layout, two_discs,
 };
 
+#[cfg(feature = "xmp")]
+use veduta::reproject::Lens;
 use veduta::reproject::Orientation;
 
 /// What a file tells of its picture as one of a sphere.
@@ -43,4 +45,14 @@ pub enum Panorama {
     },
     /// OpenEXR: `envmap` of six sides, in the layout `exr`.
     ExrCube,
+}
+
+#[cfg(feature = "xmp")]
+impl Panorama {
+    /// What a picture of `size` by a lens tells of itself: one of all around that is twice as wide as high is GPano's.
+    /// (Viewers stretch others to that shape.)
+    pub fn of_lens(lens: Lens, [width, height]: [u32; 2]) -> Option<Self> {
+        let is_whole = lens == Lens::Equirect && u64::from(width) == 2 * u64::from(height);
+        is_whole.then(|| Self::Gpano(Gpano::whole(width, height)))
+    }
 }

@@ -11,7 +11,7 @@ use super::projected::Projected;
 use super::rows::Rows;
 use super::spans;
 use super::tables::TableName;
-use crate::scene::{MeshId, Object, Scene};
+use crate::scene::{Material, MeshId, Object, Scene};
 use crate::{Camera, Guest, GuestSamples, Reading, SeenScene, SeenSpans, Source};
 use arrow_array::RecordBatch;
 use arrow_ipc::MetadataVersion;
@@ -134,6 +134,11 @@ impl<R: Read + Seek> MapReader<R> {
     /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.manifest.camera
+    }
+
+    /// The materials of all that is seen.
+    pub fn materials(&self) -> &[Material] {
+        &self.manifest.materials
     }
 
     /// The program that wrote the file.

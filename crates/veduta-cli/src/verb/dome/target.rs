@@ -12,8 +12,8 @@ use veduta::accumulate::Picture;
 use veduta::geometry::DVec2;
 use veduta::reproject::cube::{Layout, Side, Spacing};
 use veduta::reproject::{Lens, Orientation, Projection};
+use veduta_io::PictureFormat;
 use veduta_io::sphere::{self, Panorama, SideForm};
-use veduta_io::{PictureFormat, sphere::Gpano};
 
 /// Through which lens, and where it looks.
 #[derive(Debug, Args)]
@@ -249,8 +249,8 @@ impl Aim {
         }
         let mut projection = Projection::new(lens, orientation, width, height);
         let mut panorama = None;
-        if lens == Lens::Equirect && !self.mirror {
-            panorama = Some(Panorama::Gpano(Gpano::whole(width, height)));
+        if !self.mirror {
+            panorama = Panorama::of_lens(lens, [width, height]);
         }
         if self.envmap {
             if width.min(height) < 2 {

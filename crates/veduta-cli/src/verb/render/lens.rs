@@ -5,6 +5,7 @@ use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::Size;
 use crate::verb::lens::{Aim, LensArgument, side_at_parity};
+use crate::verb::output::Target;
 use crate::verb::side_names;
 use crate::verb::stored::{Stored, refuse_place, tell_work};
 use clap::{Args, ValueEnum};
@@ -17,6 +18,7 @@ use veduta::reproject::{Lens, Projection};
 use veduta::scene::{Bounds, Scene};
 use veduta_geometry::{DVec2, DVec3};
 use veduta_io::Loaded;
+use veduta_io::sphere::Panorama;
 
 /// By which lens the picture is made.
 #[derive(Debug, Args)]
@@ -115,6 +117,16 @@ impl Render {
             target.refuse_size(size)?;
         }
         if lens == LensArgument::Cube {
+            if let Some(file) = target.as_ref().and_then(Target::path)
+                && side_names::has_place(&file.file_name().unwrap_or_default().to_string_lossy())
+            {
+                let message = format!(
+                    "{}: the sides of a cube are one picture, a cross; leave the braces out, and part it by \
+                     `veduta dome CROSS --lens cube -o 'NAME_{{side}}.png'`",
+                    file.display()
+                );
+                return Err(Failure::new(Code::Usage, message));
+            }
             refuse_no_cross(size)?;
             if self.lens.lens_filter == LensFilter::Ewa {
                 let message = "the sides of a cube are made as they are; leave --lens-filter out";
@@ -125,7 +137,15 @@ impl Render {
         let eye = self.view.eye_of_lens(self, &loaded, size)?;
         let mut scene = loaded.scene;
         self.keep_layers(&mut scene)?;
-        let development = self.look.development(&scene, self.strict, talk)?;
+        let mut development = self.look.development(&scene, self.strict, talk)?;
+        let target = match lens {
+            LensArgument::Lens(lens) => {
+                development.within(self.projection(lens, size));
+                let panorama = Panorama::of_lens(lens, [size.width, size.height]);
+                target.map(|target| target.of_panorama(panorama))
+            }
+            LensArgument::Cube => target,
+        };
         let Some(places) = self.places(target, talk) else {
             return Ok(());
         };

@@ -18,7 +18,7 @@ use veduta::reproject::patches::View;
 use veduta::reproject::{Lens, Projection};
 use veduta::scene::Scene;
 use veduta_geometry::{DMat3, DMat4, DVec3};
-use veduta_io::sphere::sides_by_names;
+use veduta_io::sphere::{Panorama, sides_by_names};
 
 /// By which lens the picture is made.
 #[derive(Debug, Args)]
@@ -76,7 +76,7 @@ impl Shade {
         // Of all scenes alike, but that each has its own materials.
         let unlit = |seen: &SeenScene| seen.scene.materials.iter().all(|material| material.unlit);
         let lit = seen.iter().find(|seen| !unlit(seen)).unwrap_or(&seen[0]);
-        let development = self.look.development(&lit.scene, self.strict, talk)?;
+        let mut development = self.look.development(&lit.scene, self.strict, talk)?;
         talk.begin("shading");
         for (path, seen) in self.maps.iter().zip(&seen) {
             let shortcomings = pipeline::shortcomings(&seen.scene, &seen.map);
@@ -84,6 +84,7 @@ impl Shade {
         }
         let orientation = self.lens.aim.orientation(lens.usual_elevation());
         let projection = Projection::new(lens, orientation, size.width, size.height);
+        development.within(projection);
         let scenes: Vec<SeenViews> = seen
             .iter()
             .zip(views)
@@ -107,6 +108,8 @@ impl Shade {
         talk.begin("developing");
         let ev = development.develop(&mut picture, !target.linear);
         talk.begin("writing");
+        let panorama = Panorama::of_lens(lens, [size.width, size.height]);
+        let target = target.of_panorama(panorama);
         target.write(&picture, None)?;
         talk.end();
         talk.detail(format_args!("exposure {ev:.2} EV"));

@@ -3,11 +3,11 @@
 mod into;
 mod lens;
 
-use super::look::Look;
+use super::look::{Development, Look};
 use super::output::{Output, Target};
 use super::stored::{Changes, Stored, Trust, laid_on, open, refuse_filter_of_guests, tell_work};
 use super::vector::{Subject, Vector};
-use super::{tell_of_mattes, tell_shortcomings};
+use super::{tell_of_mattes, tell_of_nothing, tell_shortcomings};
 use crate::exit::{Code, Failure};
 use crate::talk::{Talk, print};
 use crate::values::{self, Size};
@@ -15,12 +15,15 @@ use clap::Args;
 use into::Into;
 use lens::LensOptions;
 use serde_json::{Value, json};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use veduta::accumulate::{AovSettings, Picture};
 use veduta::dice::PixelGrid;
 use veduta::drawing::LineKind;
 use veduta::pipeline;
+use veduta::scene::{Material, Scene};
 use veduta_geometry::DVec2;
-use veduta_io::Layers;
+use veduta_io::{Layers, OpenMap};
 
 /// Make a picture of a stored map
 ///
@@ -38,7 +41,8 @@ pub struct Shade {
     /// Scale of the whole picture; of x and y apart if two are given
     #[arg(long, value_name = "S|SX,SY", value_parser = values::scale)]
     scale: Option<DVec2>,
-    /// Make only this part of it, in pixels of the whole picture; parts of pixels are fine
+    /// Make only this part of it, in pixels of the whole picture; X and Y may lie within pixels. It is exposed as the
+    /// whole picture is
     #[arg(long, value_name = "X,Y,W,H", value_parser = values::window, allow_hyphen_values = true)]
     window: Option<values::Window>,
     /// Keep of each pixel all that is seen in it, each face with its depth and its object's id: a deep
@@ -214,10 +218,21 @@ impl Shade {
             }
         };
         let bytes_read = map.reader().bytes_read();
+        if self.window.is_some() {
+            keep_names(seen.scene_mut(), map.reader().materials());
+        }
         self.changes.apply(seen.scene_mut(), self.strict, talk)?;
+        let mut development = self.look.development(seen.scene(), self.strict, talk)?;
+        let for_display = match &pixels {
+            Some(target) => !self.deep && !target.linear,
+            None => true,
+        };
+        if self.window.is_some() && development.exposes_itself(for_display) {
+            let whole = self.whole_picture(&mut map)?;
+            development.expose_as(&whole, for_display);
+        }
         let mut told = match (&seen, &vector, &deep, &pixels) {
             (Stored::Regions(seen), Some((target, settings)), ..) => {
-                let development = self.look.development(&seen.scene, self.strict, talk)?;
                 let subject = Subject {
                     file: self.map(),
                     scene: &seen.scene,
@@ -244,7 +259,7 @@ impl Shade {
                 talk.detail(format_args!("{samples} samples"));
                 json!({ "output": target.name(), "size": size, "samples": samples })
             }
-            (_, _, _, Some(target)) => self.paint(target, &seen, &grid, talk)?,
+            (_, _, _, Some(target)) => self.paint(target, &seen, &grid, &development, talk)?,
             _ => unreachable!("one of them was asked for"),
         };
         if json {
@@ -278,10 +293,10 @@ impl Shade {
         target: &Target,
         seen: &Stored,
         grid: &PixelGrid,
+        development: &Development,
         talk: &mut Talk,
     ) -> Result<Value, Failure> {
         let scene = seen.scene();
-        let development = self.look.development(scene, self.strict, talk)?;
         talk.begin("shading");
         let shortcomings = seen.shortcomings();
         tell_shortcomings(self.map(), scene, &shortcomings, self.strict, talk)?;
@@ -303,6 +318,7 @@ impl Shade {
             grid: *grid,
         };
         tell_of_mattes(self.map(), &layers, self.strict, talk)?;
+        tell_of_nothing(self.map(), &picture, self.strict, talk)?;
         talk.begin("developing");
         let ev = development.develop(&mut picture, !target.linear);
         talk.begin("writing");
@@ -314,6 +330,25 @@ impl Shade {
             "size": [grid.width, grid.height],
             "exposure": ev,
         }))
+    }
+
+    /// The whole picture in the map's own size, which tells how parts of it are exposed.
+    fn whole_picture(&self, map: &mut OpenMap) -> Result<Picture, Failure> {
+        let mut whole = match Stored::read(map)? {
+            Stored::Regions(seen) => {
+                let seen = laid_on(seen, &self.look, self.trust, |reader| reader.read())?;
+                Stored::Regions(seen)
+            }
+            spans => spans,
+        };
+        self.changes.apply_unheard(whole.scene_mut())?;
+        let [width, height] = whole.size();
+        let grid = PixelGrid::of_frame(width, height);
+        let (unlit, filter) = (self.look.unlit, self.look.filter());
+        let (picture, _) = whole
+            .picture(&grid, unlit, filter, AovSettings::default())
+            .expect("a picture in its own size needs no more sub-scanlines");
+        Ok(picture)
     }
 
     /// Width and height of the frame in pixels, with fractions.
@@ -331,4 +366,18 @@ fn whole_size(frame: DVec2) -> Result<Size, Failure> {
     let pixels = frame.round().max(DVec2::ONE);
     let size = Size::new(pixels.x as u64, pixels.y as u64);
     size.map_err(|problem| Failure::new(Code::Usage, problem))
+}
+
+/// Adds the materials of a map that nothing in a window of it has, so that they may be named.
+fn keep_names(scene: &mut Scene, all: &[Material]) {
+    let there: HashSet<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
+    let unseen = all.iter().filter(|m| !there.contains(m.name.as_str()));
+    let plain = |material: &Material| Material {
+        base_color_texture: None,
+        emissive_texture: None,
+        ..material.clone()
+    };
+    // Their pictures were not read.
+    let unseen: Vec<Material> = unseen.map(plain).collect();
+    scene.materials.extend(unseen);
 }
