@@ -395,7 +395,7 @@ impl PatchPlacer {
     ) -> &[DVec2] {
         let map = view.map;
         let polygon = map.polygon(map.fragment(fragment as usize));
-        self.place_polygon(&polygon, &view.region, patch, weights_from_image)
+        self.place_polygon(polygon, &view.region, patch, weights_from_image)
     }
 
     /// The same for a polygon of the image plane, of which a region is shown.
