@@ -1,8 +1,8 @@
 //! A lens made of small perspective pictures, so that regions stay regions under it.
 //!
 //! A lens bends lines, and a bent fragment is no polygon. So the picture is cut into small triangles, *patches*, and
-//! within each the lens is replaced by the perspective that sees the same directions at the three corners: between
-//! them, directions are mixed linearly. Lines stay lines in a patch, fragments stay convex polygons, and their areas
+//! within each the lens is replaced by a perspective that sees the same directions at the three corners and, as far as one
+//! can, in the middles of its sides: in between, directions are mixed linearly. Lines stay lines in a patch, fragments stay convex polygons, and their areas
 //! in pixels are exact. How far the replacement is off is measured in pixels, and a patch that is off by more than
 //! [`TOLERANCE`] is cut again.
 //!
