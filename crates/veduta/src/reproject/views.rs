@@ -32,15 +32,15 @@ impl Views {
     /// Black views, with room for `count` levels of pyramid and aprons of `apron` texels.
     pub(super) fn new(projections: &[Projection], apron: u32, count: u32) -> Self {
         let finest = projections.iter().map(|view| {
-            let planes = Texels::new(view.width, view.height, apron);
+            let texels = Texels::new(view.width, view.height, apron);
             if view.period() == Some(f64::from(view.width)) {
-                planes.repeating()
+                texels.repeating()
             } else {
-                planes
+                texels
             }
         });
         Self {
-            pyramids: finest.map(|planes| vec![planes]).collect(),
+            pyramids: finest.map(|texels| vec![texels]).collect(),
             projections: projections.to_vec(),
             count,
             aprons: Vec::new(),
