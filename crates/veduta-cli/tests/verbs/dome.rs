@@ -1,6 +1,7 @@
 //! Domes and panoramas of people's own pictures: layouts and conventions, sequences, what is told of doubts.
 
 use crate::{Folder, png};
+use predicates::str::contains;
 use std::fs;
 
 /// A test card's cube of sides of that many pixels, as six files of that pattern.
@@ -340,6 +341,13 @@ fn a_sequence_with_a_damaged_frame_goes_on_and_says_so() {
     let stderr = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert!(stderr.contains("in.0005.png"), "{stderr}");
     folder.told("diff n_001.png out_000004.png");
+    // What no view has is a gap between the others.
+    std::fs::remove_file(folder.path("in.0002.png")).expect("is there");
+    folder
+        .veduta("dome in.####.png -o gap_##.png --size 8")
+        .assert()
+        .code(3)
+        .stderr(contains("there is no frame 2"));
     for arguments in [
         "dome none.####.png -o out_##.png",
         "dome in.####.png -o out.png",

@@ -133,6 +133,9 @@ impl Dome {
         let (left_rig, right_rig) = (left_rig?, right_rig?);
         let mut run = self.prepare(&output, format, left_rig.as_deref(), right_rig.as_deref())?;
         let numbers = self.numbers(&run)?;
+        if let Some(gap) = gap_in(&numbers) {
+            talk.warn_or_fail(gap, self.strict, Code::Missing)?;
+        }
         let mut rows = Vec::new();
         let mut failed: Vec<(u32, String)> = Vec::new();
         talk.begin(if run.is_sequence { "frames" } else { "making" });
@@ -352,4 +355,18 @@ fn is_of_a_frame(code: Code) -> bool {
         code,
         Code::BadInput | Code::InputOutput | Code::Missing | Code::Unsupported
     )
+}
+
+/// What to say of numbers that are missing between others, which follow one another at one distance: a frame that
+/// is there in no view tells nothing else.
+fn gap_in(numbers: &[u32]) -> Option<String> {
+    let steps = numbers.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = steps.clone().min()?;
+    let missing: u32 = steps.map(|between| between.div_ceil(step) - 1).sum();
+    let pair = numbers.windows(2).find(|pair| pair[1] - pair[0] > step)?;
+    let first = pair[0] + step;
+    Some(match missing {
+        1 => format!("there is no frame {first}"),
+        _ => format!("{missing} frames are not there, the first of them {first}"),
+    })
 }

@@ -80,7 +80,7 @@ Examples:
       veduta shade town.veduta -o town.png
       veduta shade town.veduta --scale 4 -o large.png
   A part of it, as through a magnifying glass:
-      veduta shade town.veduta --scale 9 --window 3000,2000,320,240 -o part.png
+      veduta shade town.veduta --scale 9 --window 5600,4200,320,240 -o part.png
   Some objects anew, in a picture that is there:
       veduta shade town.veduta -o a.exr
       veduta shade town.veduta --unlit --into a.exr --objects wall -o b.exr
