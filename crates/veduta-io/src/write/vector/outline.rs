@@ -84,6 +84,18 @@ impl Rounding {
         }
     }
 
+    /// A stroke without repeated points, and whether it is closed; `None` if one point is left. A ring round next to
+    /// nothing, such as a crack between two faces, becomes a line: it is drawn for what stands beside it.
+    #[cfg(any(feature = "svg", feature = "pdf"))]
+    pub fn stroke(self, points: &[DVec2], closed: bool) -> Option<(Vec<Point>, bool)> {
+        let mut chain = self.chain(points)?;
+        if closed && chain.first() == chain.last() {
+            chain.pop();
+        }
+        let is_closed = closed && chain.len() > 2;
+        Some((chain, is_closed))
+    }
+
     /// Appends a coordinate in decimals, as short as it can be.
     pub fn push(self, text: &mut String, value: i64) {
         let start = text.len();
@@ -161,6 +173,21 @@ mod tests {
         }
         assert_eq!(pushed(0, -100), "-100");
         assert_eq!(pushed(9, i64::MIN), "-9223372036.854775808");
+    }
+
+    #[test]
+    #[cfg(any(feature = "svg", feature = "pdf"))]
+    fn a_ring_round_a_crack_is_drawn_as_a_line() {
+        let stroke = |points: &[(f64, f64)], closed| {
+            let points: Vec<DVec2> = points.iter().copied().map(DVec2::from).collect();
+            Rounding::new(1).stroke(&points, closed)
+        };
+        let crack = [(0.0, 0.0), (5.0, 0.0), (0.01, 0.02)];
+        assert_eq!(stroke(&crack, true), Some((vec![[0, 0], [50, 0]], false)));
+        let branch = [(0.0, 0.0), (5.0, 0.0), (9.0, 0.0), (5.0, 0.01), (2.0, 3.0)];
+        let (points, closed) = stroke(&branch, true).expect("a ring");
+        assert!(closed && points.contains(&[90, 0]), "{points:?}");
+        assert_eq!(stroke(&[(1.0, 1.0), (1.01, 1.0)], false), None);
     }
 
     #[test]

@@ -269,7 +269,9 @@ impl Content {
         for Rim { radiance, chains } in &underpainting.rims {
             self.color(srgb8(*radiance), "RG");
             for Chain { points, closed } in chains {
-                self.line(points, *closed);
+                if let Some(chain) = self.rounding.line(points, *closed) {
+                    self.stroke(&chain, *closed);
+                }
             }
         }
         self.text.push_str("Q\n");
@@ -350,7 +352,9 @@ impl Content {
                 self.push(format_args!("q {narrow} w 0 J [{dash} {gap}] 0 d\n"));
             }
             for stroke in strokes {
-                self.line(&stroke.points, stroke.closed);
+                if let Some((chain, closed)) = self.rounding.stroke(&stroke.points, stroke.closed) {
+                    self.stroke(&chain, closed);
+                }
             }
             if is_hidden {
                 self.text.push_str("Q\n");
@@ -361,11 +365,9 @@ impl Content {
     }
 
     /// A stroke in the colour and width for them.
-    fn line(&mut self, points: &[DVec2], closed: bool) {
-        if let Some(chain) = self.rounding.line(points, closed) {
-            self.path(&chain);
-            self.text.push_str(if closed { "s\n" } else { "S\n" });
-        }
+    fn stroke(&mut self, chain: &[Point], closed: bool) {
+        self.path(chain);
+        self.text.push_str(if closed { "s\n" } else { "S\n" });
     }
 
     fn path(&mut self, points: &[Point]) {

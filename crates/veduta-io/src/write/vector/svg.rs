@@ -177,9 +177,9 @@ impl Svg {
                 self.begin_group(name);
             }
             for stroke in strokes {
-                if let Some(chain) = self.rounding.line(&stroke.points, stroke.closed) {
+                if let Some((chain, closed)) = self.rounding.stroke(&stroke.points, stroke.closed) {
                     self.text.push_str("<path d=\"");
-                    self.path(&[chain], stroke.closed);
+                    self.path(&[chain], closed);
                     self.text.push_str("\"/>\n");
                 }
             }
