@@ -12,6 +12,7 @@ mod frames;
 mod help;
 mod info;
 mod lens;
+mod openexr;
 mod pictures;
 mod pipes;
 mod preview;
