@@ -89,15 +89,15 @@ impl Dome {
             );
             return Err(Failure::new(Code::BadInput, message));
         }
-        let pictures: Vec<Picture> = match &frame {
-            Some(frame) => seen.views.iter().map(|view| frame.picture(view)).collect(),
+        let (views, geometry) = (&seen.views, &mut seen.geometry);
+        let made = match frame {
+            Some(frame) => geometry.pictures(frame.into_pictures(views)),
             None => {
                 let card =
                     |view: &View| test_card(view.side.expect("is a side"), view.projection.width);
-                seen.views.iter().map(card).collect()
+                geometry.pictures(views.iter().map(card).enumerate())
             }
         };
-        let made = seen.geometry.pictures(&pictures);
         let mut made: Pictures = seen
             .made
             .pictures

@@ -103,10 +103,10 @@ impl Geometry {
         sums
     }
 
-    /// Makes the pictures of a frame from those of its views.
-    pub fn pictures(&mut self, views: &[Picture]) -> Vec<Picture> {
-        for (view, picture) in views.iter().enumerate() {
-            self.views.set(view, picture);
+    /// Makes the pictures of a frame from those of its views, each with the row of its view, in any order.
+    pub fn pictures(&mut self, views: impl Iterator<Item = (usize, Picture)>) -> Vec<Picture> {
+        for (view, picture) in views {
+            self.views.set(view, &picture);
         }
         self.views.complete();
         let pictures = self.pictures.iter();

@@ -157,6 +157,27 @@ impl Frame {
         view.picture(&self.pictures[view.file])
     }
 
+    /// The pictures of views, each with the row of its view. A file's picture is given up with its last view: all of
+    /// them would take as much memory as what is made of them.
+    pub fn into_pictures(self, views: &[View]) -> impl Iterator<Item = (usize, Picture)> {
+        let mut files: Vec<Option<Picture>> = self.pictures.into_iter().map(Some).collect();
+        let mut rows: Vec<usize> = (0..views.len()).collect();
+        rows.sort_by_key(|&row| views[row].file);
+        (0..rows.len()).map(move |place| {
+            let row = rows[place];
+            let view = &views[row];
+            let file = files[view.file]
+                .take()
+                .expect("is kept up to its last view");
+            let picture = view.picture(&file);
+            let next = rows.get(place + 1).map(|&next| views[next].file);
+            if next == Some(view.file) {
+                files[view.file] = Some(file);
+            }
+            (row, picture)
+        })
+    }
+
     /// A file's name.
     pub fn name(&self, file: usize) -> String {
         plain(&self.paths[file].to_string_lossy())
