@@ -267,23 +267,15 @@ struct Rim {
 fn rims(picture: &Picture, lens: &Projection) -> Vec<Rim> {
     // A preview is smaller than the picture.
     let scale = f64::from(lens.width) / f64::from(picture.width);
-    let rows = picture.pixels.par_chunks(picture.width as usize);
-    let of_rows = rows.enumerate().map(|(row, pixels)| {
-        let of_pixel = |(column, own): (usize, &[f32; 4])| {
-            let [column, row] = [column, row].map(|at| ((at as f64 + 0.5) * scale) as u32);
-            let covered = lens.coverage(column, row) as f32;
-            let open = 1.0 - own[3];
-            let share = ((covered - own[3]) / open).clamp(0.0, 1.0);
-            (covered < 1.0 && open > 0.0).then_some((*own, share))
-        };
-        let first = row * picture.width as usize;
-        let rims = pixels.iter().enumerate().map(of_pixel).enumerate();
-        let rims = rims.filter_map(|(column, rim)| {
-            let (own, share) = rim?;
-            let pixel = first + column;
-            Some(Rim { pixel, own, share })
-        });
-        rims.collect::<Vec<Rim>>()
-    });
-    of_rows.collect::<Vec<_>>().into_iter().flatten().collect()
+    let width = picture.width as usize;
+    let of_pixel = |(pixel, &own): (usize, &[f32; 4])| {
+        let place = [pixel % width, pixel / width];
+        let [column, row] = place.map(|at| ((at as f64 + 0.5) * scale) as u32);
+        let covered = lens.coverage(column, row) as f32;
+        let open = 1.0 - own[3];
+        let share = ((covered - own[3]) / open).clamp(0.0, 1.0);
+        (covered < 1.0 && open > 0.0).then_some(Rim { pixel, own, share })
+    };
+    let pixels = picture.pixels.par_iter().enumerate();
+    pixels.filter_map(of_pixel).collect()
 }

@@ -228,7 +228,7 @@ impl Shade {
             None => true,
         };
         if self.window.is_some() && development.exposes_itself(for_display) {
-            let whole = self.whole_picture(&mut map)?;
+            let whole = self.whole_picture(&mut map, &seen)?;
             development.expose_as(&whole, for_display);
         }
         let mut told = match (&seen, &vector, &deep, &pixels) {
@@ -332,16 +332,20 @@ impl Shade {
         }))
     }
 
-    /// The whole picture in the map's own size, which tells how parts of it are exposed.
-    fn whole_picture(&self, map: &mut OpenMap) -> Result<Picture, Failure> {
-        let mut whole = match Stored::read(map)? {
-            Stored::Regions(seen) => {
-                let seen = laid_on(seen, &self.look, self.trust, |reader| reader.read())?;
-                Stored::Regions(seen)
+    /// The whole picture in the map's own size, which tells how parts of it are exposed. `seen` is what the window
+    /// needs: spans are always read as a whole.
+    fn whole_picture(&self, map: &mut OpenMap, seen: &Stored) -> Result<Picture, Failure> {
+        let regions;
+        let whole = match seen {
+            Stored::Spans(_) => seen,
+            Stored::Regions(_) => {
+                let seen = map.read(|reader| reader.read())?;
+                let mut seen = laid_on(seen, &self.look, self.trust, |reader| reader.read())?;
+                self.changes.apply_unheard(&mut seen.scene)?;
+                regions = Stored::Regions(seen);
+                &regions
             }
-            spans => spans,
         };
-        self.changes.apply_unheard(whole.scene_mut())?;
         let [width, height] = whole.size();
         let grid = PixelGrid::of_frame(width, height);
         let (unlit, filter) = (self.look.unlit, self.look.filter());
